@@ -169,7 +169,9 @@ def mean_of(stages: Mapping[Path, float], out: Path) -> None:
         for name, value in held[-1].items()
     }
     last = list(stages)[-1]
-    about = json.loads((last / CONFIG).read_text()) | {"mean_of": [[folder.name, one] for folder, one in stages.items()]}
+    about = json.loads((last / CONFIG).read_text()) | {
+        "mean_of": [[folder.name, one] for folder, one in stages.items()]
+    }
     out.mkdir(parents=True, exist_ok=True)
     torch.save(mean, out / WEIGHTS)
     (out / CONFIG).write_text(json.dumps(about, indent=1))

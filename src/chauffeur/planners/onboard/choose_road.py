@@ -217,7 +217,11 @@ def choose_pull_over(meaning: Meaning, options: Options) -> Chosen | Declined:
     rate, factor = _HALTING[manner]
     filled = options.filled(f"pull_over.{manner}", meaning.manner, rate_mps2=rate, factor=factor)
     moves = situation.lane_count - 1 - situation.lane_index
-    way = "move right to the emergency lane, lane by lane, and halt there" if moves else "halt on this emergency lane"
+    way = (
+        "change lanes to the right as far as the emergency lane, and halt there"
+        if moves
+        else "halt on this emergency lane"
+    )
     does = f"{way} with an even {number(rate)} m/s2"
     return Chosen(filled, "pull_over", does, (), (("target_speed_mps", 0.0),), moves)
 
