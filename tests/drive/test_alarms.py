@@ -53,7 +53,7 @@ def drive(text: str, planner: Planner, scenario: str = "overtake") -> RecordedTr
 
 @pytest.mark.parametrize("planner", [refuses("stop"), Answers(Plan(Thoughts("I stop."), Program(STANDING_PROGRAM)))])
 def test_a_stop_that_a_planner_would_not_or_may_not_drive_is_the_cars_own(planner: Planner) -> None:
-    recorded = drive("enough of this", planner)
+    recorded = drive("Change to the left lane.", planner)
     assert (recorded.trip.plan.planner, recorded.trip.plan.alarm) == (EMERGENCY_PLANNER, "stop")
     assert recorded.final is not None and recorded.final.ego.speed_mps < 0.1
 
@@ -62,7 +62,7 @@ def test_a_stop_that_a_planner_would_not_or_may_not_drive_is_the_cars_own(planne
     "planner", [refuses("distress"), refuses(words="The passenger tells of a medical emergency; I only drive.")]
 )
 def test_distress_that_a_planner_declines_is_asked_about(planner: Planner) -> None:
-    plan = drive("enough of this", planner).trip.plan
+    plan = drive("Change to the left lane.", planner).trip.plan
     assert (plan.planner, plan.alarm) == (EMERGENCY_PLANNER, "distress")
     assert QUESTION in plan.thoughts.text and plan.offer
 
@@ -118,7 +118,7 @@ def test_a_vehicle_is_asked_for_a_speed_of_0() -> None:
         found: list[tuple[str, str]] = []
         for alarm in ("stop", "distress"):
             async with VehicleSession(vehicle, file, refuses(alarm)) as road:
-                answer = await road.ask("enough of this")
+                answer = await road.ask("Change to the left lane.")
                 found.append((answer.status, "" if answer.plan is None else answer.plan.intent))
         return found
 
