@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -20,7 +21,8 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.concept.nouns import Lead
-from chauffeur.planners.onboard.dialect import DialectStep, read
+from chauffeur.planners.onboard.dialect import DialectStep, Number, StepCondition, read
+from chauffeur.planners.onboard.driven import drive_alike
 from chauffeur.planners.onboard.language_model import SHIPPED, LanguageModelPlanner
 from chauffeur.planners.registry import make_planner
 
@@ -166,3 +168,12 @@ def test_what_it_writes_is_shown_as_it_comes() -> None:
     plan = planned(planner, "Change to the left lane")
     assert len(pieces) > 1
     assert "".join(piece for piece, attempt in pieces if attempt == pieces[-1][1]) == plan.raw
+
+
+def test_the_same_manoeuvre_at_another_time_is_another_drive() -> None:
+    request = PlanRequest(Instruction("go left"), Context("", HIGHWAY), SystemMessage(""), History(), limits=Limits())
+    left = DialectStep("lane_left")
+    assert drive_alike((left,), (left,), "go left", request)
+    for other in (replace(left, condition=StepCondition("if", "clear_left")), replace(left, wait_s=Number(10.0))):
+        assert not drive_alike((left,), (other,), "go left", request)
+    assert not drive_alike((), (), "go left", request)

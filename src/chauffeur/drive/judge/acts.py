@@ -137,7 +137,7 @@ def _kept_from(drive: TracedDrive, act: Act, start: int) -> Found:
     if act.act in ("straight", "go", "wait", "keep"):
         return Found("not_judged", start, "no predicate knows this")
     since = start
-    if act.act == "follow" and not drive.road.uninterrupted:  # up to a junction nobody can go another way
+    if act.act == "follow" and not drive.road.uninterrupted:  # before a junction there is no other way to go
         since = next((one.leaves for one in drive.passages if one.enters >= start), len(drive.all) - 1)
     did = _became(drive, replace(act, negated=False), since, last=False)
     if did.result == "done":

@@ -78,7 +78,11 @@ def linked_here(
 
 def drive_alike(some: Sequence[DialectStep], others: Sequence[DialectStep], wish: str, request: PlanRequest) -> bool:
     """Whether two readings of a wish come to the same drive here: a lane change without a side, where there is one."""
-    if not some or not others:
+
+    def waits(steps: Sequence[DialectStep]) -> list[object]:  # of which linking knows nothing
+        return [(step.condition, step.wait_s) for step in steps]
+
+    if not some or waits(some) != waits(others):
         return False
     one, other = (linked_here(steps, wish, request)[0] for steps in (some, others))
     return isinstance(one, Linked) and isinstance(other, Linked) and one.choice == other.choice
