@@ -22,13 +22,12 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.planners.arbitration import PACES, Said, denied_intent, slow_speed_words, within_mood
+from chauffeur.planners.arbitration import PACES, denied_intent, slow_speed_words, within_mood
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.choose_speed import choose_style
 from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.options import Chosen, Options
 from chauffeur.planners.onboard.personal import Leaning
-from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.registry import make_planner
 
 _PLANNERS = ("onboard", "talk2drive")
@@ -139,12 +138,6 @@ def test_a_sorter_is_believed_where_it_goes_the_way_that_was_said(planners: dict
     ):
         found = plan(planners["talk2drive"], wish, situation)
         assert found.policy is not None and found.intent.startswith(intent), (wish, found.intent)
-
-
-def test_said_outright_is_a_verb_with_its_object() -> None:
-    assert Said.of(meanings_said("Move over to the right.")).contradicts(side="", pace=1)
-    assert not Said.of(meanings_said("Move over to the right.")).contradicts(side="right", pace=-1)
-    assert Said.of(meanings_said("Drive faster.")).contradicts(side="", pace=-1)
 
 
 def test_where_nobody_can_answer_the_best_reading_is_driven(planners: dict[str, Planner]) -> None:

@@ -6,7 +6,7 @@ What was said outright is certain: a side, a number, a pace. Of a thing that was
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal, Self
 
@@ -20,7 +20,6 @@ from chauffeur.planners.base import Planner, declined
 from chauffeur.safety.dangers import danger
 
 if TYPE_CHECKING:
-    from chauffeur.planners.onboard.meaning import Meaning
     from chauffeur.planners.onboard.options import Chosen
 
 SURE: Final = 0.95
@@ -37,9 +36,6 @@ _CREEP_MPS: Final = 5.0
 UNSURE_WORDS: Final = "I am not sure what you want."
 _STANDS: Final = "We would stand in the way of others."
 _CRAWLS: Final = "That is less than half the speed of the traffic here."
-
-_OUTRIGHT: Final = 1.0
-"""Score of a meaning from which it is a verb with its object; below it is a lone word: "a lorry from the right"."""
 
 _PASSING: Final = frozenset({"overtake", "overtaking", "pass", "passing"})
 _SLOWING: Final = frozenset({"slow", "slower", "brake", "braking", "decelerate"})
@@ -70,34 +66,6 @@ _DENIED: Final = "You say what you do not want, and I would have done just that.
 
 PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
 """Moods that quicken (1) or calm (-1) the drive."""
-
-
-@dataclass(frozen=True, slots=True)
-class Said:
-    """What words say outright, whatever else they may mean.
-
-    Attributes:
-        sides: Left and right, as far as named for something to do.
-        pace: 1 for faster, -1 for slower, 0 for neither or both.
-        plain: Whether anything at all is said so: a verb with its object, not a lone word that may describe the road.
-    """
-
-    sides: frozenset[str]
-    pace: Literal[-1, 0, 1]
-    plain: bool
-
-    @classmethod
-    def of(cls, meanings: Sequence[Meaning]) -> Self:
-        """What the rules found in the words; they know nothing of any network."""
-        plain = [m for m in meanings if m.score >= _OUTRIGHT]
-        sides = frozenset(m.direction for m in plain if m.direction in ("left", "right"))
-        return cls(sides, _sign(m.change for m in plain if m.manoeuvre == "speed"), bool(plain))
-
-    def contradicts(self, *, side: str, pace: int) -> bool:
-        """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
-        if self.sides and side not in self.sides:
-            return True
-        return self.pace not in (0, pace)
 
 
 def within_mood(speed_mps: float, pace: int, now_mps: float, most_mps: float) -> float:

@@ -30,16 +30,15 @@ def goal_of(request: PlanRequest) -> WishGoal:
     Only numbers that the person named are in it: how much faster "faster" is, is the planner's to choose.
     """
     from chauffeur.planners.onboard.choose import choose
-    from chauffeur.planners.onboard.meaning import Reading
     from chauffeur.planners.onboard.options import Declined
     from chauffeur.planners.onboard.personal import Leaning
-    from chauffeur.planners.onboard.understand import understand
+    from chauffeur.planners.onboard.understand import meanings_said
 
-    reading = understand(request.instruction.text)
-    if not isinstance(reading, Reading):
+    meanings = meanings_said(request.instruction.text)
+    if not meanings:
         return NO_GOAL
-    choice = choose(reading, request.context.situation, request.limits, lambda _: Leaning())
+    choice = choose(meanings, request.context.situation, request.limits, lambda _: Leaning())
     if isinstance(choice, Declined):
         return NO_GOAL
-    named = all(step.amount is not None for step in reading.steps)
+    named = all(meaning.amount is not None for meaning in meanings)
     return WishGoal(choice.intent, choice.settings(()) if named else ())

@@ -14,10 +14,9 @@ from chauffeur.describe import describe
 from chauffeur.drive.session import make_world
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.exemplars import Filled, program_of
-from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
-from chauffeur.planners.onboard.understand import understand
+from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.safety.faithfulness import FactSurroundings
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -110,10 +109,10 @@ def draw(rng: np.random.Generator) -> PlannedCase:
 
 def plan(wish: str, start: PlanStart) -> PlannedCase | None:
     """A wish over a scene; None where the planner declines."""
-    reading = understand(wish)
-    if isinstance(reading, NotUnderstood):
+    meanings = meanings_said(wish)
+    if not meanings:
         return None
-    choice = choose(reading, start.situation, LAMPILOT_LIMITS, lambda _: Leaning())
+    choice = choose(meanings, start.situation, LAMPILOT_LIMITS, lambda _: Leaning())
     return None if isinstance(choice, Declined) else PlannedCase(wish, start, choice.steps)
 
 

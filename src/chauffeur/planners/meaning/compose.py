@@ -60,7 +60,7 @@ _EVENTS: Final = {
     "arrives": "I cannot tell when somebody arrives",
     "told": "say it again when I am to do it",
     "red": "I do not set off on red",
-    "other": "I do not know how to see that",
+    **dict.fromkeys(("slower", "closer", "further", "other"), "I do not know how to see that"),
 }
 
 

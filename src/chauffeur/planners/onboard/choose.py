@@ -19,7 +19,7 @@ from chauffeur.planners.onboard.choose_road import (
     choose_turn,
 )
 from chauffeur.planners.onboard.choose_speed import choose_resume, choose_speed, choose_style
-from chauffeur.planners.onboard.meaning import Manoeuvre, Meaning, Reading
+from chauffeur.planners.onboard.meaning import Manoeuvre, Meaning
 from chauffeur.planners.onboard.options import Chosen, Declined, Options
 from chauffeur.planners.onboard.personal import Leaning
 
@@ -53,30 +53,32 @@ class Choice:
 
 
 def choose(
-    reading: Reading,
+    meanings: Sequence[Meaning],
     situation: Situation,
     limits: Limits,
     leaning: Callable[[str], Leaning],
     *,
     wary: bool = False,
+    joins: bool = True,
 ) -> Choice | Declined:
     """Exemplars and numbers for a wish, or the reason why this road or situation does not allow it.
 
     Args:
-        reading: What was understood.
+        meanings: What was understood, in order.
         situation: Where we are.
         limits: Bounds for what the planner chooses itself.
         leaning: What this person's history says about an intent.
         wary: Whether they say that the road is slippery or the sight bad.
+        joins: Whether an overtaking and the way back to its lane are one step.
     """
     steps: list[Chosen] = []
     options = Options(situation, limits, wary=wary)
-    waiting = list(reading.steps)
+    waiting = list(meanings)
     while waiting:
         meaning = waiting.pop(0)
         options = options.with_leaning(leaning(meaning.family))
-        chosen = choose_step(meaning, options)
-        if isinstance(chosen, Chosen) and waiting and _comes_back(chosen, waiting[0]):
+        chosen = _CHOOSERS[meaning.manoeuvre](meaning, options)
+        if joins and isinstance(chosen, Chosen) and waiting and _comes_back(chosen, waiting[0]):
             # "overtake it, then move back right": one manoeuvre with its return
             del waiting[0]
             chosen = _CHOOSERS["overtake"](replace(meaning, variant="return"), options)
@@ -85,11 +87,6 @@ def choose(
         steps.append(chosen)
         options = options.after(chosen)
     return Choice(tuple(steps), "+".join(step.intent for step in steps))
-
-
-def choose_step(meaning: Meaning, options: Options) -> Chosen | Declined:
-    """Exemplar and numbers for one thing to do, or the reason why not."""
-    return _CHOOSERS[meaning.manoeuvre](meaning, options)
 
 
 def _comes_back(overtaking: Chosen, following: Meaning) -> bool:

@@ -12,7 +12,6 @@ from chauffeur.planners.onboard.options import (
     Chosen,
     Declined,
     Options,
-    distance_of,
 )
 
 _WIDER = {BIT: (1.15, 3.0), MUCH: (1.8, 12.0)}
@@ -31,45 +30,39 @@ _NOBODY = "There is no vehicle ahead of us within 100 m"
 def choose_gap(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a wish about the distance to the vehicle ahead."""
     amount = meaning.amount
-    if amount is not None and amount.dimension == "time" and amount.frame == "absolute":
+    if amount is not None and amount.dimension == "time":
         return _seconds(meaning, amount.value, options)
-    if amount is not None and amount.dimension in ("speed", "lanes", "other", "time"):
-        return Declined("I cannot make a distance of that. Please name it in metres, feet, car lengths or seconds.")
     front = options.situation.front
     if front is None and options.front_known:
         return _nobody(meaning, options)
     now = front.distance_m if front is not None else M_PER_CAR_LENGTH + USUAL_HEADWAY_S * options.speed
     if amount is None:
-        if meaning.variant == "hold" or meaning.change == 0:
+        if meaning.variant == "hold":
             return _chosen(meaning, options, "gap.hold", now, f"keep the {number(now)} m to the vehicle ahead")
         return _step(meaning, now, options)
     return _named(meaning, amount, now, options)
 
 
-def _named(meaning: Meaning, amount: Amount, now: float, options: Options) -> Chosen | Declined:
-    value, assumed = distance_of(amount)
+def _named(meaning: Meaning, amount: Amount, now: float, options: Options) -> Chosen:
+    value = amount.value
     if amount.bound == "at_most":
-        return _chosen(
-            meaning, options, "gap.at_most", value, f"stay within {number(value)} m of the vehicle ahead", assumed
-        )
+        return _chosen(meaning, options, "gap.at_most", value, f"stay within {number(value)} m of the vehicle ahead")
     if amount.bound == "at_least":
         does = f"never get closer than {number(value)} m to the vehicle ahead"
-        return _chosen(meaning, options, "gap.at_least", value, does, assumed)
+        return _chosen(meaning, options, "gap.at_least", value, does)
     if amount.frame == "factor":
         gap = value * now
         exemplar = "gap.multiply_wider" if value >= 1 else "gap.multiply_closer"
         does = f"make the gap {number(value)} times what it is, about {number(gap)} m, and keep it"
-        return _chosen(meaning, options, exemplar, gap, does, assumed, factor=value)
+        return _chosen(meaning, options, exemplar, gap, does, factor=value)
     if amount.frame == "relative":
-        if meaning.change == 0:
-            return Declined(f"By {amount.said}: closer or further back?")
         gap = now + meaning.change * value
         way = ("gap.wider_by", "drop back") if meaning.change > 0 else ("gap.closer_by", "close up")
         does = f"{way[1]} by {number(value)} m, to about {number(gap)} m, and keep that gap"
-        return _chosen(meaning, options, way[0], gap, does, assumed, delta_m=value)
+        return _chosen(meaning, options, way[0], gap, does, delta_m=value)
     exemplar, way = ("gap.set_wider", "drop back") if value > now else ("gap.set_closer", "close up")
     does = f"{way} from {number(now)} m to {number(value)} m behind the vehicle ahead and keep that gap"
-    return _chosen(meaning, options, exemplar, value, does, assumed)
+    return _chosen(meaning, options, exemplar, value, does)
 
 
 def _step(meaning: Meaning, now: float, options: Options) -> Chosen | Declined:
@@ -152,15 +145,7 @@ def _pace(meaning: Meaning) -> dict[str, float]:
     return {"close_mps": close, "open_mps": opening}
 
 
-def _chosen(
-    meaning: Meaning,
-    options: Options,
-    exemplar: str,
-    gap: float,
-    does: str,
-    assumed: tuple[str, ...] = (),
-    **numbers: float,
-) -> Chosen:
+def _chosen(meaning: Meaning, options: Options, exemplar: str, gap: float, does: str, **numbers: float) -> Chosen:
     values: dict[str, float] = {"gap_m": gap, "floor_m": min(8.0, gap), **_pace(meaning), **numbers}
     filled = options.filled(exemplar, meaning.manner, **values)
-    return Chosen(filled, meaning.family, does, assumed, (("gap_m", round(gap, 2)),))
+    return Chosen(filled, meaning.family, does, (), (("gap_m", round(gap, 2)),))

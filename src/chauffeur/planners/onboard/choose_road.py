@@ -23,13 +23,7 @@ def choose_lane(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a lane wish."""
     situation = options.situation
     if meaning.variant == "hold":
-        if situation.turns and meaning.loose:
-            return Declined("Which way shall I take at the junction: " + _listed(situation.turns) + "?")
         return Chosen(options.filled("lane.keep", meaning.manner), "lane.keep", "stay in this lane")
-    if meaning.loose and situation.turns and meaning.direction is not None:
-        return choose_turn(meaning, options)
-    if meaning.variant == "home":
-        return Declined("Which lane do you mean, the left or the right one?")
     if meaning.variant == "return":
         return _back_on_the_road(meaning, options)
     if options.last_lane < 1:

@@ -11,7 +11,6 @@ from chauffeur.planners.onboard.options import (
     Chosen,
     Declined,
     Options,
-    speed_of,
     speed_words,
 )
 
@@ -50,10 +49,9 @@ _WARY: tuple[float, float, str] = (
 
 def choose_speed(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a wish about speed."""
-    if meaning.variant == "hold" or (meaning.change == 0 and meaning.amount is None and not meaning.variant):
-        return _chosen(
-            meaning, options, "speed.hold", options.cruise_mps, f"keep our {speed_words(options.cruise_mps)}"
-        )
+    if meaning.variant == "hold":
+        does = f"keep our {speed_words(options.cruise_mps)}"
+        return _chosen(meaning, options, "speed.hold", options.cruise_mps, does)
     if meaning.variant == "limit":
         return _limit(meaning, options)
     if meaning.variant == "match":
@@ -68,39 +66,32 @@ def choose_speed(meaning: Meaning, options: Options) -> Chosen | Declined:
 
 
 def _named(meaning: Meaning, amount: Amount, options: Options) -> Chosen | Declined:
-    value, assumed = speed_of(amount, options, meaning.change)
-    if amount.dimension in ("distance", "time", "lanes", "other"):
-        return Declined("I cannot make a speed of that. Please name it in m/s, mph or km/h.")
+    value = amount.value
     if amount.bound == "at_most":
         does = f"stay at or below {speed_words(value)}"
-        return _chosen(meaning, options, "speed.cap", value, does, assumed)
+        return _chosen(meaning, options, "speed.cap", value, does)
     if amount.bound == "at_least":
-        return _chosen(meaning, options, "speed.floor", value, f"stay at or above {speed_words(value)}", assumed)
+        return _chosen(meaning, options, "speed.floor", value, f"stay at or above {speed_words(value)}")
     if amount.frame == "factor":
         target = value * options.cruise_mps
         does = f"drive at {number(value)} times our speed, about {speed_words(target)}"
-        return _chosen(meaning, options, "speed.multiply", target, does, assumed, factor=value)
+        return _chosen(meaning, options, "speed.multiply", target, does, factor=value)
     if amount.frame == "relative":
-        if meaning.change == 0:
-            return Declined(f"By {amount.said}: faster or slower?")
         target = options.cruise_mps + meaning.change * value
         if target < 0:
             return Declined(f"We drive {speed_words(options.cruise_mps)}; we cannot go {amount.said} slower than that.")
         way = ("speed.up_by", "speed up") if meaning.change > 0 else ("speed.down_by", "slow down")
         does = f"{way[1]} by {number(value)} m/s, to about {speed_words(target)}, and hold it"
-        return _chosen(meaning, options, way[0], target, does, assumed, delta_mps=value)
-    if value >= options.cruise_mps:
-        return _chosen(
-            meaning, options, "speed.set_up", value, f"speed up to {speed_words(value)} and hold it", assumed
-        )
-    return _chosen(meaning, options, "speed.set_down", value, f"slow down to {speed_words(value)} and hold it", assumed)
+        return _chosen(meaning, options, way[0], target, does, delta_mps=value)
+    exemplar, way = ("speed.set_up", "speed up") if value >= options.cruise_mps else ("speed.set_down", "slow down")
+    return _chosen(meaning, options, exemplar, value, f"{way} to {speed_words(value)} and hold it")
 
 
 def _limit(meaning: Meaning, options: Options) -> Chosen | Declined:
     if meaning.amount is None:
         does = f"drive at the speed limit, {speed_words(options.sign_mps)} here"
         return _chosen(meaning, options, "speed.limit", options.sign_mps, does)
-    value, assumed = speed_of(meaning.amount, options)
+    value = meaning.amount.value
     target = options.sign_mps + value
     if target < 0.0:
         return Declined(
@@ -108,7 +99,7 @@ def _limit(meaning: Meaning, options: Options) -> Chosen | Declined:
         )
     side = "above" if value > 0 else "below"
     does = f"drive {number(abs(value))} m/s {side} the limit, at {speed_words(target)}"
-    return _chosen(meaning, options, "speed.over_limit", target, does, assumed)
+    return _chosen(meaning, options, "speed.over_limit", target, does)
 
 
 def _match(meaning: Meaning, options: Options) -> Chosen:
@@ -178,7 +169,7 @@ def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
 def choose_resume(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for leaving things as they are, or driving normally again."""
     headway = options.headway(USUAL_HEADWAY_S)
-    if meaning.manoeuvre == "keep" or meaning.variant == "hold":
+    if meaning.manoeuvre == "keep":
         does = f"change nothing: this lane, at our {speed_words(options.cruise_mps)}"
         return _chosen(meaning, options, "keep.as_is", options.cruise_mps, does)
     does = f"drive normally: at the limit of {speed_words(options.own_cap_mps)}, {number(headway)} s behind others"
@@ -191,7 +182,6 @@ def _chosen(
     exemplar: str,
     target: float,
     does: str,
-    assumed: tuple[str, ...] = (),
     headway: float | None = None,
     **numbers: float,
 ) -> Chosen:
@@ -200,4 +190,4 @@ def _chosen(
         settings.append(("time_headway_s", round(headway, 2)))
         numbers["time_headway_s"] = headway
     filled = options.filled(exemplar, meaning.manner, target_speed_mps=target, **numbers)
-    return Chosen(filled, meaning.family, does, assumed, tuple(settings))
+    return Chosen(filled, meaning.family, does, (), tuple(settings))

@@ -7,7 +7,7 @@ import unicodedata
 from typing import Final
 
 from chauffeur.language.tokens import plain
-from chauffeur.planners.onboard.words import words_file
+from chauffeur.language.word_files import word_groups
 
 CAN_DO: Final = (
     "I can drive faster or slower or at a speed you name, follow closer or further back, change lanes, overtake, turn "
@@ -21,7 +21,8 @@ _COURTESIES: Final = re.compile(
 )
 """Said in English sentences too."""
 _FOREIGN_WORDS: Final = {
-    group[0].strip("[]"): frozenset(" ".join(group[1:]).split()) for group in words_file("foreign.txt")
+    group[0].strip("[]"): frozenset(" ".join(group[1:]).split())
+    for group in word_groups("chauffeur.planners.onboard", "foreign.txt")
 }
 
 

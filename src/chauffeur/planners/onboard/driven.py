@@ -114,7 +114,7 @@ def plan_of_linked(
     planner: Planner, read: ReadSteps, linked: Linked, used: Sequence[Leaning], request: PlanRequest, begun: float
 ) -> Plan:
     """The plan that drives linked steps."""
-    thoughts = thoughts_of(linked.reading, linked.choice, request.context.situation, used)
+    thoughts = thoughts_of(linked.meanings, linked.choice, request.context.situation, used)
     return Plan(
         thoughts=Thoughts(" ".join([thoughts.text, *read.assumed])),
         policy=Program(write(read.steps), library=linked.library),

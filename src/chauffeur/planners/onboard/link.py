@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from chauffeur.concept import Limits, Situation
-from chauffeur.planners.onboard.choose import Choice, choose_step
+from chauffeur.planners.onboard.choose import Choice, choose
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, DialectStep
 from chauffeur.planners.onboard.exemplars import function_of
-from chauffeur.planners.onboard.meaning import Reading
-from chauffeur.planners.onboard.options import Chosen, Declined, Options
+from chauffeur.planners.onboard.meaning import Meaning
+from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
 
 PERIOD_S = 0.1
@@ -59,12 +59,12 @@ class Linked:
 
     Attributes:
         choice: Exemplars, numbers and words of the steps.
-        reading: What they mean.
+        meanings: What they mean.
         library: The functions that the program calls.
     """
 
     choice: Choice
-    reading: Reading
+    meanings: tuple[Meaning, ...]
     library: str
 
 
@@ -85,17 +85,11 @@ def link(
         leaning: What this person's history says about an intent.
         wary: Whether they say that the road is slippery or the sight bad.
     """
-    options = Options(situation, limits, wary=wary)
-    chosen: list[tuple[DialectStep, Chosen]] = []
-    for step in steps:
-        options = options.with_leaning(leaning(step.meaning.family))
-        found = choose_step(step.meaning, options)
-        if isinstance(found, Declined):
-            return found
-        chosen.append((step, found))
-        options = options.after(found)
-    choice = Choice(tuple(one for _, one in chosen), "+".join(one.intent for _, one in chosen))
-    return Linked(choice, Reading(tuple(step.meaning for step in steps)), _library(chosen))
+    meanings = tuple(step.meaning for step in steps)
+    choice = choose(meanings, situation, limits, leaning, wary=wary, joins=False)
+    if isinstance(choice, Declined):
+        return choice
+    return Linked(choice, meanings, _library(list(zip(steps, choice.steps, strict=True))))
 
 
 def _library(chosen: Sequence[tuple[DialectStep, Chosen]]) -> str:

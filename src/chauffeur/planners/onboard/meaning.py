@@ -32,8 +32,8 @@ class Amount:
     """A quantity the person named.
 
     Attributes:
-        value: SI value (m/s, m, s), or the plain number for `share`, `lanes` and `bare`.
-        dimension: What it measures.
+        value: SI value (m/s, m, s), or the plain number for `share` and `lanes`.
+        dimension: `speed`, `distance`, `time`, `lanes` or `share`.
         frame: How it counts.
         bound: Whether it is a target or a limit.
         said: The words it came from.
@@ -56,13 +56,10 @@ class Meaning:
         change: +1 more speed or a larger gap, -1 less; 0 no direction said, or hold what is.
         amount: Quantity named, if any.
         degree: Strength in words when no quantity is named.
-        variant: Refines the manoeuvre: `hold`, `limit`, `match`, `max`, `edge` (leftmost, rightmost), `return`,
-            or the name of a style.
-        condition: `safe` or `intersection` when the wish names one.
+        variant: Refines the manoeuvre: `hold`, `limit`, `match`, `max`, `edge` (leftmost, rightmost), `middle`,
+            `return`, `no overtaking`, or the name of a style.
+        condition: `safe` where a lane is to be clear first; else empty.
         manner: `gentle`, `swift`, or empty.
-        loose: "go left" says a side and not whether lane or turn; the road decides.
-        evidence: Words that carried the meaning.
-        score: Sum of evidence weights.
     """
 
     manoeuvre: Manoeuvre
@@ -73,9 +70,6 @@ class Meaning:
     variant: str = ""
     condition: str = ""
     manner: str = ""
-    loose: bool = False
-    evidence: tuple[str, ...] = ()
-    score: float = 0.0
 
     @property
     def family(self) -> str:
@@ -98,34 +92,3 @@ class Meaning:
         if self.amount is not None and self.amount.frame == "absolute":
             return "time" if self.amount.dimension == "time" else "set"
         return {1: "increase", -1: "decrease", 0: "hold"}[self.change]
-
-
-Why = Literal[
-    "empty", "symbols", "language", "off_topic", "question", "ambiguous", "unknown", "unsupported", "too_long"
-]
-
-
-@dataclass(frozen=True, slots=True)
-class NotUnderstood:
-    """Why a wish was not taken, in words that help to say it again.
-
-    Attributes:
-        why: Kind of trouble.
-        words: For the person; a question when one answer would settle it.
-    """
-
-    why: Why
-    words: str
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """A wish understood: what to do, in order.
-
-    Attributes:
-        steps: One to three meanings.
-        assumed: What was taken for granted, each a full sentence.
-    """
-
-    steps: tuple[Meaning, ...]
-    assumed: tuple[str, ...] = ()

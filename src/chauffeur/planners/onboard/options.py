@@ -10,7 +10,6 @@ from chauffeur.concept import Limits, Situation
 from chauffeur.concept.units import M_PER_CAR_LENGTH, MPS_PER_KMH, MPS_PER_MPH, kmh, mph
 from chauffeur.planners.onboard.exemplars import Filled
 from chauffeur.planners.onboard.exemplars.library import number
-from chauffeur.planners.onboard.meaning import Amount, Change
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.programs.catalogue import vocabulary_of
 
@@ -180,25 +179,6 @@ def speed_words(speed_mps: float) -> str:
     return f"{number(speed_mps)} m/s ({mph(speed_mps):.0f} mph, {kmh(speed_mps):.0f} km/h)"
 
 
-def speed_of(amount: Amount, options: Options, change: Change = 0) -> tuple[float, tuple[str, ...]]:
-    """Speed or speed difference of an amount, m/s, with what had to be assumed about its unit.
-
-    A bare number is in the unit of the road's signs, unless only another unit makes a new speed of it that is slower
-    (`change` -1) or faster (+1) than now, as the person said.
-    """
-    if amount.dimension != "bare":
-        return amount.value, ()
-    unit, factor = _unit_of_signs(options.sign_mps)
-    value, why = amount.value * factor, "the unit of the signs on this road"
-    if change and amount.frame == "absolute" and (value - options.cruise_mps) * change < 0:
-        for other, scale in (("km/h", MPS_PER_KMH), ("mph", MPS_PER_MPH), ("m/s", 1.0)):
-            if (amount.value * scale - options.cruise_mps) * change > 0:
-                unit, value = other, amount.value * scale
-                why = "because only then it is " + ("faster than now" if change > 0 else "slower than now")
-                break
-    return value, (f"You named no unit: I take {number(amount.value)} as {unit}, {why}.",)
-
-
 def unit_of_bare(value: float, situation: Situation, change: int = 0) -> tuple[str, str]:
     """The dialect's unit of a speed without one, and how that is told.
 
@@ -224,10 +204,3 @@ def _unit_of_signs(limit_mps: float) -> tuple[str, float]:
         if abs(shown - step * round(shown / step)) < 0.05:
             return unit, factor
     return "m/s", 1.0
-
-
-def distance_of(amount: Amount) -> tuple[float, tuple[str, ...]]:
-    """Distance of an amount, m, with what had to be assumed about its unit."""
-    if amount.dimension != "bare":
-        return amount.value, ()
-    return amount.value, (f"You named no unit: I take {number(amount.value)} as metres.",)

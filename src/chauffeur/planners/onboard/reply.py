@@ -19,14 +19,12 @@ class OnboardReply:
         source: The program's text.
         question: What the model asks back.
         refusal: Why it refuses.
-        meant: Intent of what the question asks about, `+` between steps; empty where it asks about nothing to do.
     """
 
     steps: tuple[DialectStep, ...] = ()
     source: str = ""
     question: str = ""
     refusal: str = ""
-    meant: str = ""
 
 
 def read_reply(text: str) -> OnboardReply:

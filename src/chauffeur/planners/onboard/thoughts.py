@@ -7,23 +7,23 @@ from collections.abc import Sequence
 from chauffeur.concept import Situation, Thoughts
 from chauffeur.planners.onboard.choose import Choice
 from chauffeur.planners.onboard.exemplars.library import number
-from chauffeur.planners.onboard.meaning import Meaning, Reading
+from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.personal import Leaning
 
 
 def thoughts_of(
-    reading: Reading, choice: Choice, situation: Situation, used: Sequence[Leaning], *, does: str = ""
+    meanings: Sequence[Meaning], choice: Choice, situation: Situation, used: Sequence[Leaning], *, does: str = ""
 ) -> Thoughts:
     """R for what was settled. The numbers are those of the policy, written the same way.
 
     Args:
-        reading: What was understood.
+        meanings: What was understood.
         choice: What was settled.
         situation: Where we are.
         used: What the person's history said about it.
         does: What is done, a clause after "I", where that is not what the steps say.
     """
-    understood = "; then ".join(_understood(meaning) for meaning in reading.steps)
+    understood = "; then ".join(_understood(meaning) for meaning in meanings)
     done = does or ". Then I ".join(step.does for step in choice.steps)
     sentences = [f"You want: {understood}.", _situation(situation), f"I {done}."]
     sentences += [sentence for step in choice.steps for sentence in step.assumed]

@@ -31,7 +31,6 @@ from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
-from chauffeur.planners.onboard.moods import EASE, HURRY
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
@@ -80,8 +79,8 @@ _WORDS: Final[dict[str, str]] = {
     "pass": "Overtake the car ahead.",
     "stay": "Stay behind the car ahead.",
     "right": "Change to the right lane.",
-    "hurry": HURRY,
-    "calm": EASE,
+    "hurry": "I'm in a hurry.",
+    "calm": "Drive calmly, please.",
 }
 """What a hint asks for, in words that are read as any others."""
 _TAKEN: Final[dict[str, str]] = {
@@ -242,7 +241,7 @@ class EmbeddedParameters:
         if isinstance(found, Declined):
             return declined(self, found.words, begun, intent=intent, raw=settled.written.text)
         found, why = _at_pace(found, intent, request)
-        thoughts = thoughts_of(linked.reading, linked.choice, settled.situation, used, does=does(found))
+        thoughts = thoughts_of(linked.meanings, linked.choice, settled.situation, used, does=does(found))
         words = " ".join((*why, thoughts.text, *_overruled(request.history, used)))
         plan = self._plan(found, words, intent, request, begun, used)
         return replace(plan, usage=usage_of(settled.written), raw=settled.written.text)

@@ -12,7 +12,7 @@ from chauffeur.bench.lampilot.scenes.unambiguous import meaning_of
 from chauffeur.concept import LAMPILOT_LIMITS, ScenarioError, Situation
 from chauffeur.planners.onboard.choose import Choice, choose
 from chauffeur.planners.onboard.exemplars import program_of
-from chauffeur.planners.onboard.meaning import Meaning, Reading
+from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.personal import Leaning
 
 EXEMPLARS = "onboard-exemplars-v1"
@@ -46,7 +46,7 @@ def _exemplars(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
         return _gap_first(goal, situation)
     out: list[str] = []
     for meanings in _ways(goal):
-        choice = choose(Reading(meanings), situation, LAMPILOT_LIMITS, _no_leaning)
+        choice = choose(meanings, situation, LAMPILOT_LIMITS, _no_leaning)
         if isinstance(choice, Choice):
             out.append(program_of([step.filled for step in choice.steps]))
     return tuple(dict.fromkeys(out))

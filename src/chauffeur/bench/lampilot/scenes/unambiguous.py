@@ -14,8 +14,8 @@ from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.language import read_quantities
 from chauffeur.language.quantities import mark_quantities
 from chauffeur.language.tokens import plain, tokens_of
-from chauffeur.planners.onboard.meaning import Amount, Manoeuvre, Meaning, NotUnderstood, Side
-from chauffeur.planners.onboard.understand import understand
+from chauffeur.planners.onboard.meaning import Amount, Manoeuvre, Meaning, Side
+from chauffeur.planners.onboard.understand import meanings_said
 
 MIN_WORDS, MAX_WORDS = 2, 14
 """Of LaMPilot's instructions (Tab. III)."""
@@ -63,12 +63,10 @@ def fault_of_goal(text: str, goal: dict[str, Any], change: int = 0) -> str:
     by_rule = _rules(text, goal, expected)
     if by_rule:
         return by_rule
-    reading = understand(text)
-    if isinstance(reading, NotUnderstood):
-        return f"not understood: {reading.why}"
-    if len(reading.steps) != 1:
-        return "more than one wish"
-    found = reading.steps[0]
+    meanings = meanings_said(text)
+    if len(meanings) != 1:
+        return "more than one wish" if meanings else "not understood"
+    found = meanings[0]
     if found.change * change < 0:
         return "says more where less is needed, or less for more"
     return _differs(found, expected)
@@ -77,10 +75,9 @@ def fault_of_goal(text: str, goal: dict[str, Any], change: int = 0) -> str:
 def _fault_of_steps(text: str, wish: SceneWish) -> str:
     if not wish.means:
         return ""
-    reading = understand(text)
-    if isinstance(reading, NotUnderstood):
-        return f"not understood: {reading.why}"
-    found, wanted = list(reading.steps), [meaning_of(goal) for goal in wish.means]
+    found, wanted = meanings_said(text), [meaning_of(goal) for goal in wish.means]
+    if not found:
+        return "not understood"
     if len(found) != len(wanted):
         return "other number of steps"
     for one, expected in zip(found, wanted, strict=True):
