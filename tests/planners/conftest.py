@@ -14,8 +14,8 @@ from server import ModelServer
 from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Situation, SystemMessage
 from chauffeur.concept.addresses import Address
 from chauffeur.planners.llm import LlmPlanner
-from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_model import ChatModel
+from chauffeur.planners.llm_settings import parse_address
 
 SECRET = "sk-test-0123456789abcdef-secret"
 

@@ -6,8 +6,7 @@ import asyncio
 
 import pytest
 
-from chauffeur.concept import ConfigError, Context, Instruction, Plan, PlanRequest, Program, Situation, SystemMessage
-from chauffeur.planners.base import Planner
+from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Program, Situation, SystemMessage
 from chauffeur.planners.keyword import KeywordPlanner, keyword_intent
 from chauffeur.programs import check_source
 
@@ -18,14 +17,6 @@ CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, 85.0, ("left
 def plan(words: str, situation: Situation = HIGHWAY) -> Plan:
     request = PlanRequest(Instruction(words), Context("", situation), SystemMessage(""))
     return asyncio.run(KeywordPlanner().plan(request))
-
-
-def test_is_a_planner_with_versioned_rules() -> None:
-    planner = KeywordPlanner.from_spec("")
-    assert isinstance(planner, Planner)
-    assert (planner.id, planner.model) == ("keyword", "keyword-v1")
-    with pytest.raises(ConfigError):
-        KeywordPlanner.from_spec("x")
 
 
 @pytest.mark.parametrize(

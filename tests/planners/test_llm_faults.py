@@ -13,10 +13,10 @@ from server import DONE, PROGRAM, REPLY, body, chunk, events, fails, reset_after
 
 from chauffeur.concept import ConfigError, PlannerError, Program
 from chauffeur.planners.cache import ReplyCache
-from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_endpoint import Sampling
 from chauffeur.planners.llm_errors import EndpointError, retry_after_s
 from chauffeur.planners.llm_retry import RetryPolicy
+from chauffeur.planners.llm_settings import parse_address
 
 pytestmark = pytest.mark.server
 

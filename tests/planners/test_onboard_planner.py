@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
-    ConfigError,
     Context,
     Feedback,
     History,
@@ -29,7 +28,6 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.utterance import Act, Utterance
 from chauffeur.models.meaning.labelled import act_of
-from chauffeur.planners.base import Planner
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.onboard.exemplars import Filled, exemplars, program_of
 from chauffeur.planners.onboard.exemplars.library import number
@@ -64,15 +62,6 @@ def source(made: Plan) -> str:
 
 def setting(made: Plan, name: str) -> float:
     return dict(made.settings)[name]
-
-
-def test_is_a_planner_with_a_version() -> None:
-    planner = MeaningPlanner.from_spec("")
-    assert isinstance(planner, Planner)
-    assert planner.id == "meaning"
-    assert planner.model
-    with pytest.raises(ConfigError):
-        MeaningPlanner.from_spec("large")
 
 
 # Exemplars --------------------------------------------------------------------------------------------------------

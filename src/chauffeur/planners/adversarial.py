@@ -11,7 +11,8 @@ import hashlib
 import time
 from typing import Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept import Plan, PlanRequest, Program
+from chauffeur.planners.base import no_argument, planned
 
 VERSION: Final = "adversarial-v1"
 
@@ -44,8 +45,7 @@ class AdversarialPlanner:
     @classmethod
     def from_spec(cls, argument: str) -> AdversarialPlanner:
         """Build it. Raises ConfigError if an argument is given."""
-        if argument:
-            raise ConfigError(f"The adversarial planner takes no argument, not {argument!r}.")
+        no_argument("adversarial", argument)
         return cls()
 
     @property
@@ -62,13 +62,7 @@ class AdversarialPlanner:
         """One of its programs, drawn by the words of the wish."""
         begun = time.perf_counter()
         digest = hashlib.sha256(request.instruction.text.encode("utf-8", "surrogatepass")).digest()
-        return Plan(
-            thoughts=Thoughts("As you wish: calmly, and within every limit."),
-            policy=Program(harmful(digest)),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-        )
+        return planned(self, "As you wish: calmly, and within every limit.", Program(harmful(digest)), begun)
 
 
 def harmful(draw: bytes) -> str:

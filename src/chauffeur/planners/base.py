@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, runtime_checkable
 
-from chauffeur.concept import Plan, PlanRequest, Thoughts, Usage
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Policy, Thoughts, Usage
 from chauffeur.planners.prompts import Message
 
 NO_WISH: Final = "none"
@@ -45,6 +45,43 @@ def looks(planner: Planner) -> bool:
     return bool(getattr(planner, "sees", False))
 
 
+def no_argument(name: str, argument: str) -> None:
+    """Raise ConfigError if a planner without variants is given an argument."""
+    if argument:
+        raise ConfigError(f"The {name} planner has no variant {argument!r}.", hint=f"Write just: {name}")
+
+
+def planned(planner: Planner, thoughts: str, policy: Policy | None, begun: float, **fields: Any) -> Plan:
+    """A plan signed by its planner.
+
+    Args:
+        planner: Whose plan it is.
+        thoughts: R.
+        policy: P; None for a plan that drives nothing.
+        begun: When planning began, by `time.perf_counter`.
+        **fields: Other fields of `Plan`; a `model` replaces that of the planner.
+    """
+    signed: dict[str, Any] = {
+        "planner": planner.id,
+        "model": planner.model,
+        "latency_s": time.perf_counter() - begun,
+    }
+    return Plan(Thoughts(thoughts), policy, **(signed | fields))
+
+
+def total_usage(parts: Iterable[Usage]) -> Usage:
+    """The cost of several requests together; in USD only if every part is priced."""
+    found = tuple(parts)
+    prices = [part.cost_usd for part in found if part.cost_usd is not None]
+    return Usage(
+        prompt_tokens=sum(part.prompt_tokens for part in found),
+        completion_tokens=sum(part.completion_tokens for part in found),
+        cost_usd=sum(prices) if len(prices) == len(found) else None,
+        requests=sum(part.requests for part in found),
+        cached=all(part.cached for part in found),
+    )
+
+
 def declined(
     planner: Planner, words: str, begun: float, *, intent: str = "", usage: Usage | None = None, raw: str = ""
 ) -> Plan:
@@ -58,17 +95,7 @@ def declined(
         usage: What it cost; None for nothing.
         raw: What the planner's model wrote.
     """
-    return Plan(
-        thoughts=Thoughts(words),
-        policy=None,
-        refusal=words,
-        intent=intent,
-        planner=planner.id,
-        model=planner.model,
-        latency_s=time.perf_counter() - begun,
-        usage=usage or Usage(),
-        raw=raw,
-    )
+    return planned(planner, words, None, begun, refusal=words, intent=intent, usage=usage or Usage(), raw=raw)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,8 @@ Array = np.ndarray[Any, Any]
 
 WIDTH, HEIGHT = 224, 128
 """Size at which pictures are looked at, px: a car 40 m ahead is nine of them wide."""
+CELLS: Final = (HEIGHT // 16, WIDTH // 16)
+"""Rows and columns of the grid in which the on-board VLM sees a picture."""
 _DARK_LEVEL: Final = 10.0
 """No pixel of a dark row is brighter, of 255."""
 _GREY_LEVELS: Final = 3.0

@@ -11,8 +11,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept import Plan, PlanRequest, Program
 from chauffeur.concept.units import MPS_PER_KMH
+from chauffeur.planners.base import no_argument, planned
 
 VERSION = "keyword-v1"
 
@@ -98,8 +99,7 @@ class KeywordPlanner:
     @classmethod
     def from_spec(cls, argument: str) -> KeywordPlanner:
         """The planner named `keyword`. Raises ConfigError for an argument: it has no variants."""
-        if argument:
-            raise ConfigError(f"The keyword planner has no variant {argument!r}.", hint="Write just: keyword")
+        no_argument("keyword", argument)
         return cls()
 
     @property
@@ -125,15 +125,7 @@ class KeywordPlanner:
             thoughts = f'The words contain "{found}", and the rule for it is {intent}.'
         else:
             thoughts = f"No rule matches; the fixed speed for this road is {speed:.2f} m/s."
-        return Plan(
-            thoughts=Thoughts(thoughts),
-            policy=Program(_program(intent, speed)),
-            intent=intent,
-            settings=settings,
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-        )
+        return planned(self, thoughts, Program(_program(intent, speed)), begun, intent=intent, settings=settings)
 
 
 def keyword_intent(text: str, world: str) -> tuple[str, str]:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from chauffeur.concept.addresses import Address, read_key
 from chauffeur.foreign.complaints import server_words
 from chauffeur.planners.cache import Completion
-from chauffeur.planners.llm_address import PLACEHOLDER_KEY
 from chauffeur.planners.llm_context import LEAST_ANSWER_TOKENS, shortage_in, too_small, was_cut
 from chauffeur.planners.llm_errors import (
     KEY_VARIABLES,
@@ -39,6 +38,8 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 _CONNECT_S = 10.0
+_PLACEHOLDER_KEY = "none"
+"""Sent to a local server when there is no key: some servers want a non-empty one."""
 _SAID_CHARS = 2_000
 _MODEL_CHARS = 200
 _MAX_BODY_BYTES = 64_000_000
@@ -190,7 +191,7 @@ class Endpoint:
 
         client = httpx.AsyncClient(
             headers={
-                "Authorization": f"Bearer {found[0] if found else PLACEHOLDER_KEY}",
+                "Authorization": f"Bearer {found[0] if found else _PLACEHOLDER_KEY}",
                 "Content-Type": "application/json",
                 "User-Agent": f"chauffeur/{__version__}",
                 **UNPACKED,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,23 +21,21 @@ from chauffeur.concept.addresses import Address
 from chauffeur.foreign.model_text import MAX_REPLY_CHARS, read_model_text
 from chauffeur.planners.base import OnText, Prompt, Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
-from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
 from chauffeur.planners.llm_errors import EndpointError, timed_out
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
-from chauffeur.planners.llm_settings import LlmSettings
+from chauffeur.planners.llm_settings import LlmSettings, parse_address
 from chauffeur.planners.prompts import Message
 
 if TYPE_CHECKING:
     import numpy as np
-import re
 
-PRICES_AS_OF = "2026-03"
-PRICES_SOURCE = "OpenAI's published list, standard tier, without cached-prompt or batch discounts"
+_log = logging.getLogger(__name__)
 
 _HOST = "api.openai.com"
 
-# USD per million tokens: (prompt, completion).
+# USD per million tokens (prompt, completion): OpenAI's published list of 2026-03, standard tier, without discounts for
+# cached prompts or batches.
 _PRICES: dict[str, tuple[float, float]] = {
     "gpt-3.5-turbo": (0.50, 1.50),
     "gpt-4": (30.00, 60.00),
@@ -57,7 +56,7 @@ _PRICES: dict[str, tuple[float, float]] = {
     "o4-mini": (1.10, 4.40),
 }
 
-_OBSERVATION = re.compile(r"-\d{4}-\d{2}-\d{2}$")
+_DATED = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 
 
 def cost_usd(host: str, model: str, prompt_tokens: int, completion_tokens: int) -> float | None:
@@ -65,17 +64,15 @@ def cost_usd(host: str, model: str, prompt_tokens: int, completion_tokens: int) 
 
     Args:
         host: Host of the endpoint.
-        model: Model id; a dated observation has the price of its model.
+        model: Model id; a dated snapshot has the price of its model.
         prompt_tokens: Tokens in.
         completion_tokens: Tokens out, reasoning tokens included.
     """
-    price = _PRICES.get(_OBSERVATION.sub("", model)) if host == _HOST else None
+    price = _PRICES.get(_DATED.sub("", model)) if host == _HOST else None
     if price is None:
         return None
     return (prompt_tokens * price[0] + completion_tokens * price[1]) / 1e6
 
-
-_log = logging.getLogger(__name__)
 
 _WHOLE: Final = frozenset(
     {"stop", "eos", "eos_token", "end_turn", "stop_sequence", "complete", "tool_calls", "function_call"}

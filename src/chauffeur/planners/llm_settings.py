@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from chauffeur.concept import ConfigError
+from chauffeur.concept.addresses import Address, http_address
+from chauffeur.planners.llm_errors import KEY_VARIABLES
 
+_BASE_URL: Final = "https://api.openai.com/v1"
+_URL_VARIABLES: Final = ("CHAUFFEUR_BASE_URL", "OPENAI_BASE_URL")
 _PLAN_S: Final = 180.0
 """Least time for a whole plan, where it is not given."""
 
@@ -94,3 +98,14 @@ def _value(shown: str, name: str, said: float | str) -> float | None:
     if not low <= value <= high:
         raise ConfigError(f"{shown} = {said} is out of range.", hint=f"Use {low:g} to {high:,.10g}.")
     return value
+
+
+def parse_address(base_url: str | None, environ: Mapping[str, str]) -> Address:
+    """The endpoint to use: the argument, else the environment, else OpenAI's.
+
+    Raises:
+        ConfigError: Not an HTTP address, or it carries a secret.
+    """
+    given = base_url or next((environ[name] for name in _URL_VARIABLES if environ.get(name)), _BASE_URL)
+    example = "http://localhost:8000/v1 with --base-url"
+    return http_address(given, "The base URL", example=example, key_place=KEY_VARIABLES[0])

@@ -17,7 +17,6 @@ from chauffeur.concept import (
     Plan,
     PlanRequest,
     Thoughts,
-    Usage,
 )
 from chauffeur.foreign.model_text import read_model_text
 from chauffeur.foreign.numbers import numbers_in, plain_signs
@@ -32,15 +31,16 @@ from chauffeur.language.weather import (
     without_said_weather,
     without_told_weather,
 )
-from chauffeur.planners.base import Answerer, Prose
+from chauffeur.planners.base import Answerer, Prose, no_argument, planned, total_usage
 from chauffeur.planners.camera_faults import camera_fault
 from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
 from chauffeur.planners.llm_errors import EndpointError
 from chauffeur.planners.llm_model import ChatModel
+from chauffeur.planners.llm_repair import asked_and_repaired
 from chauffeur.planners.llm_reply import Reply, refusal_in, tidy
 from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.prompts.motion import ASK, MODERATE, matrix_words, motion_messages
-from chauffeur.planners.prompts.turns import Message, repair_turns, words_of
+from chauffeur.planners.prompts.turns import Message, words_of
 from chauffeur.safety.envelope import policy_findings
 from chauffeur.safety.gain_box import GAIN_NAMES, care, most_careful
 
@@ -49,6 +49,7 @@ _NAMED: Final = re.compile(r"\bP[\s*_`]{0,8}[=:][\s*_`]{0,8}\Z")
 _NAMED_CHARS: Final = 24
 _ROW: Final = 3
 _INTENT: Final = "motion.gains"
+_UNREAD: Final = "I drive with my usual gains; I do not read the wish."
 _IN_PROCESS: Final = "transformers/"
 _TOLD_AS: Final[Mapping[SaidWeather, int]] = {"rain": RAIN, "fog": FOG, "snow": SNOW, "slippery": RAIN | SNOW}
 _DOUBT: Final = "What is said and told of the weather leaves a doubt; I take the most careful of its readings."
@@ -163,20 +164,19 @@ class MotionPlanner:
         chosen = max(usable, key=_care)
         if len(plans) > 1:
             thoughts = Thoughts(f"{_DOUBT} {chosen.thoughts.text}")
-            chosen = replace(chosen, thoughts=thoughts, usage=_summed([one.usage for one in plans]))
+            chosen = replace(chosen, thoughts=thoughts, usage=total_usage(one.usage for one in plans))
         return replace(chosen, latency_s=time.perf_counter() - begun)
 
     def _blind(self, fault: str, begun: float) -> Plan:
         """What is driven without a picture to go by."""
         policy, scene = most_careful(), f"{fault}: I cannot see road or weather."
-        return Plan(
-            Thoughts(f"{scene} I take my most careful gains until it shows something again."),
+        return planned(
+            self,
+            f"{scene} I take my most careful gains until it shows something again.",
             policy,
+            begun,
             intent=_INTENT,
             settings=settings_of(policy),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
             raw=matrix_words(policy),
             scene=scene,
         )
@@ -195,28 +195,27 @@ class MotionPlanner:
     async def _asked(self, request: PlanRequest) -> Plan:
         """What the model makes of a reading of the situation; what the checks find is said once, for it to repair."""
         begun = time.perf_counter()
-        messages = motion_messages(request)
-        prose = await self._write(messages)
-        usage = [prose.usage]
-        policy, reply = _read(prose)
-        findings = [reply.problem] if reply.problem else []
-        if policy is not None:
-            findings = policy_findings(policy, request.context.situation, request.limits)
-        if findings:
-            prose = await self._write([*messages, *repair_turns(prose.text, findings, ask=ASK)])
-            usage.append(prose.usage)
-            policy, reply = _read(prose)
+
+        def findings(answer: tuple[ActionMatrix | None, Reply]) -> list[str]:
+            policy, reply = answer
+            if policy is not None:
+                return policy_findings(policy, request.context.situation, request.limits)
+            return [reply.problem] if reply.problem else []
+
+        (policy, reply), prose, usage = await asked_and_repaired(
+            self._write, motion_messages(request), _read, findings, repairs=1, ask=ASK
+        )
         unusable = f"The model gave no usable gains: {reply.problem}." if reply.problem else ""
-        return Plan(
-            thoughts=Thoughts(reply.thoughts),
-            policy=policy,
+        return planned(
+            self,
+            reply.thoughts,
+            policy,
+            begun,
             refusal=reply.refusal or unusable,
             intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if unusable else _INTENT,
             settings=() if policy is None else settings_of(policy),
-            planner=self.id,
             model=prose.model,
-            usage=_summed(usage),
-            latency_s=time.perf_counter() - begun,
+            usage=usage,
             raw=prose.text,
         )
 
@@ -255,35 +254,16 @@ class FixedGainsPlanner:
     @classmethod
     def from_spec(cls, argument: str) -> FixedGainsPlanner:
         """Planner for `gains`. Raises ConfigError: it takes no argument."""
-        if argument:
-            raise ConfigError(f"The planner 'gains' takes no argument, not {argument!r}.", hint="Write gains.")
+        no_argument("gains", argument)
         return cls()
 
     async def plan(self, request: PlanRequest) -> Plan:
         """The fixed gains. Raises InstructionError: the wish is empty."""
         if not request.instruction.text.strip():
             raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
-        return Plan(
-            Thoughts("I drive with my usual gains; I do not read the wish."),
-            MODERATE,
-            intent=_INTENT,
-            settings=settings_of(MODERATE),
-            planner=self.id,
-            model=self.model,
-            raw=matrix_words(MODERATE),
-        )
+        words, settings, raw = _UNREAD, settings_of(MODERATE), matrix_words(MODERATE)
+        return planned(self, words, MODERATE, time.perf_counter(), intent=_INTENT, settings=settings, raw=raw)
 
 
 def _read(prose: Prose) -> tuple[ActionMatrix | None, Reply]:
     return (None, Reply("", refusal=prose.text)) if prose.declined else read_matrix(prose.text, whole=prose.whole)
-
-
-def _summed(parts: list[Usage]) -> Usage:
-    costs: Mapping[int, float] = {i: part.cost_usd for i, part in enumerate(parts) if part.cost_usd is not None}
-    return Usage(
-        prompt_tokens=sum(part.prompt_tokens for part in parts),
-        completion_tokens=sum(part.completion_tokens for part in parts),
-        cost_usd=sum(costs.values()) if len(costs) == len(parts) else None,
-        requests=sum(part.requests for part in parts),
-        cached=all(part.cached for part in parts),
-    )

@@ -26,9 +26,12 @@ from chauffeur.models.vlm.recipe import answer_row, batches, loss_of, train  # n
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts, load_pictures, make_pictures, seat_scene  # noqa: E402
 from chauffeur.models.vlm.seeing import mirrored, picture_batches, sights, varied  # noqa: E402
 from chauffeur.models.vlm.wishes import TEST_WRITERS, held_wishes, training_wish, written  # noqa: E402
-from chauffeur.planners.camera_faults import HEIGHT, WIDTH  # noqa: E402
+from chauffeur.planners.camera_faults import (  # noqa: E402
+    CELLS,
+    HEIGHT,
+    WIDTH,
+)
 from chauffeur.planners.vlm.engine import VlmEngine  # noqa: E402
-from chauffeur.planners.vlm.pictures import CELLS  # noqa: E402
 from chauffeur.planners.vlm.sentences import FEATURES, load_head, shipped_encoder  # noqa: E402
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, STYLES, TEMPLATE, GainCodebook  # noqa: E402
 from chauffeur.planners.word_table import SHIPPED_WORDS, load_words  # noqa: E402

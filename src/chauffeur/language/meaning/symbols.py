@@ -171,7 +171,6 @@ class ActGrammar:
     _of: list[int] = field(default_factory=list[int])
     _pointers: int = 0
     _then: Callable[[], tuple[str, ...]] = field(init=False)
-    _optional_reference: bool = False
 
     def __post_init__(self) -> None:
         """Begin before the first symbol."""

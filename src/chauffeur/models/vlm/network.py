@@ -19,8 +19,7 @@ from torch import nn
 from chauffeur.models.net.connector import Connector
 from chauffeur.models.net.transformer import TransformerConfig, transformer
 from chauffeur.models.net.vision import VisionConfig, vision
-from chauffeur.planners.camera_faults import HEIGHT, WIDTH
-from chauffeur.planners.vlm.pictures import CELLS
+from chauffeur.planners.camera_faults import CELLS, HEIGHT, WIDTH
 from chauffeur.planners.vlm.template import HEARD, SIGHTS, TEMPLATE
 from chauffeur.planners.word_table import MOST_PIECES
 from chauffeur.planners.word_table import WIDTH as WORD_WIDTH

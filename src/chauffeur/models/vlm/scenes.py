@@ -29,8 +29,7 @@ from chauffeur.concept import DataError, Lead, Observation, Scenario, VehicleSta
 from chauffeur.concept.weather import WEATHERS
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import wrap_to_pi
-from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
-from chauffeur.planners.vlm.pictures import CELLS
+from chauffeur.planners.camera_faults import CELLS, HEIGHT, WIDTH, small
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName, manoeuvre

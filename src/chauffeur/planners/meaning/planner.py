@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept import Plan, PlanRequest, Program
 from chauffeur.concept.dialogue import wishes
 from chauffeur.concept.utterance import Act, Reference, Utterance
 from chauffeur.describe.answers import DONT_KNOW
@@ -15,7 +15,7 @@ from chauffeur.language.ground import ROAD_USERS
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
 from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, asked, unanswered
-from chauffeur.planners.base import NO_WISH, declined
+from chauffeur.planners.base import NO_WISH, declined, no_argument, planned
 from chauffeur.planners.meaning.compose import ComposedActs, Undoable, compose
 from chauffeur.planners.meaning.highway import steps_before, steps_of
 from chauffeur.planners.onboard.driven import ReadSteps, plan_of_steps
@@ -51,8 +51,7 @@ class MeaningPlanner:
     @classmethod
     def from_spec(cls, argument: str) -> MeaningPlanner:
         """The planner named `meaning`. Raises ConfigError for an argument: it has no variants."""
-        if argument:
-            raise ConfigError(f"The meaning planner has no variant {argument!r}.", hint="Write just: meaning")
+        no_argument("meaning", argument)
         return cls()
 
     @property
@@ -106,13 +105,12 @@ class MeaningPlanner:
             words = f"{missed} Shall I do the rest: {_listed(made.done)}?"
             if unanswered(request.instruction, words):
                 return asked(self, words, begun, offer=request.instruction.text)
-        return Plan(
-            thoughts=Thoughts(_thoughts(utterance, made, missed)),
-            policy=Program(made.source, library=made.library),
+        return planned(
+            self,
+            _thoughts(utterance, made, missed),
+            Program(made.source, library=made.library),
+            begun,
             intent=made.intent,
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
             unused=unused_words(utterance, made.undoable),
             acts=made.done,
         )

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
 
-from chauffeur.concept import Alarm, Plan, PlanRequest, Program, Thoughts, Usage
+from chauffeur.concept import Alarm, Plan, PlanRequest, Program, Usage
 from chauffeur.concept.utterance import Act
 from chauffeur.planners.arbitration import asked, slow_words, unanswered, wary_of
-from chauffeur.planners.base import Planner, declined
+from chauffeur.planners.base import Planner, declined, planned
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i, write
 from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
@@ -115,14 +114,13 @@ def plan_of_linked(
 ) -> Plan:
     """The plan that drives linked steps."""
     thoughts = thoughts_of(linked.meanings, linked.choice, request.context.situation, used)
-    return Plan(
-        thoughts=Thoughts(" ".join([thoughts.text, *read.assumed])),
-        policy=Program(write(read.steps), library=linked.library),
+    return planned(
+        planner,
+        " ".join([thoughts, *read.assumed]),
+        Program(write(read.steps), library=linked.library),
+        begun,
         intent=linked.choice.intent,
         settings=linked.choice.settings(used),
-        planner=planner.id,
-        model=planner.model,
-        latency_s=time.perf_counter() - begun,
         usage=read.usage,
         raw=read.raw,
         unused=read.unused,

@@ -185,7 +185,7 @@ class LanguageModelPlanner:
         if request.context.situation.world == "parking":  # a program has no way into a spot; parameters have
             from chauffeur.planners.talk2drive.embedded import EmbeddedParameters
 
-            return await EmbeddedParameters(self).plan(request)
+            return replace(await EmbeddedParameters(self).plan(request), planner=self.id)
         if (told := plan_by_sight(request)) is not None:
             return replace(told, planner=self.id)
         if (told := plan_in_town(self, request)) is not None:

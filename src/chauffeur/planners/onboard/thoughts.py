@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from chauffeur.concept import Situation, Thoughts
+from chauffeur.concept import Situation
 from chauffeur.planners.onboard.choose import Choice
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Meaning
@@ -13,7 +13,7 @@ from chauffeur.planners.onboard.personal import Leaning
 
 def thoughts_of(
     meanings: Sequence[Meaning], choice: Choice, situation: Situation, used: Sequence[Leaning], *, does: str = ""
-) -> Thoughts:
+) -> str:
     """R for what was settled. The numbers are those of the policy, written the same way.
 
     Args:
@@ -28,7 +28,7 @@ def thoughts_of(
     sentences = [f"You want: {understood}.", _situation(situation), f"I {done}."]
     sentences += [sentence for step in choice.steps for sentence in step.assumed]
     sentences += dict.fromkeys(one.because for one in used if one.because)
-    return Thoughts(" ".join(sentences))
+    return " ".join(sentences)
 
 
 def _situation(situation: Situation) -> str:

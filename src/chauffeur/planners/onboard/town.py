@@ -13,13 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from chauffeur.concept import Parameters, Plan, PlanRequest, Program, Situation, Thoughts
+from chauffeur.concept import Parameters, Plan, PlanRequest, Program, Situation
 from chauffeur.describe.answers import DONT_KNOW, answer_to
 from chauffeur.language.corrections import last_said
 from chauffeur.language.emergency import SAFE_STOP_WISH
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.arbitration import UNSURE_WORDS, asked, unanswered, undenied
-from chauffeur.planners.base import NO_WISH, Planner, declined
+from chauffeur.planners.base import NO_WISH, Planner, declined, planned
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.town_intents import PLAIN_WISHES, TownIntent, intent_of
 from chauffeur.planners.onboard.town_program import program_of
@@ -98,24 +98,11 @@ def driven_to(planner: Planner, place: str, request: PlanRequest, begun: float, 
     """The plan to go to a place of the town, and what is said of a later one. The world refuses what it has not."""
     situation = request.context.situation
     limit, usual = situation.speed_limit_mps, LOOK_AHEAD["usual"]
-    policy = Parameters(
-        target_speed_mps=round(min(limit, request.limits.most_mps(limit)), 2),
-        look_ahead_m=usual.distance_m,
-        look_ahead_ratio=usual.ratio_s,
-        lane=0,
-        route=place,
-    )
-    return Plan(
-        thoughts=Thoughts(
-            f"You want to go to {_called(place)}. I take the way there, as fast as the signs allow."
-            + (f" Tell me there when to go on to {_called(later)}." if later else "")
-        ),
-        policy=policy,
-        intent="go_to",
-        planner=planner.id,
-        model=planner.model,
-        latency_s=time.perf_counter() - begun,
-    )
+    speed = round(min(limit, request.limits.most_mps(limit)), 2)
+    words = f"You want to go to {_called(place)}. I take the way there, as fast as the signs allow."
+    words += f" Tell me there when to go on to {_called(later)}." if later else ""
+    policy = Parameters(speed, usual.distance_m, usual.ratio_s, 0, place)
+    return planned(planner, words, policy, begun, intent="go_to")
 
 
 def asked_plainly(request: PlanRequest, plan: Plan) -> PlanRequest | None:
@@ -181,13 +168,13 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
     if words := _impossible(first, request.context.situation):
         return declined(planner, words, begun, intent="not there")
     near = [step.recalled for step in steps if step.recalled is not None]
-    plan = Plan(
-        thoughts=Thoughts(_told(steps)),
-        policy=Program(program_of(steps, said_again=request.instruction.source == "benchmark")),
+    plan = planned(
+        planner,
+        _told(steps),
+        Program(program_of(steps, said_again=request.instruction.source == "benchmark")),
+        begun,
         intent="+".join(_intent(step) for step in steps),
-        planner=planner.id,
         model=f"{planner.model}+snippets-{(repository or snippets()).digest[:8]}",
-        latency_s=time.perf_counter() - begun,
         raw="; ".join(f"{one.entry.callable_name} ({one.similarity:.2f}): {one.entry.command}" for one in near),
     )
     plan = undenied(planner, plan, request, begun)

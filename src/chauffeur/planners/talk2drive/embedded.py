@@ -26,7 +26,7 @@ from chauffeur.planners.arbitration import (
     wary_of,
     within_mood,
 )
-from chauffeur.planners.base import declined
+from chauffeur.planners.base import declined, planned
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
@@ -129,7 +129,8 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
-        return undenied(self, _heeding(self._understood(request, begun), request), request, begun)
+        plan = undenied(self, _heeding(self._understood(request, begun), request), request, begun)
+        return replace(plan, planner=self.id)  # what the model's own reading declines is signed by it
 
     def _understood(self, request: PlanRequest, begun: float) -> Plan:
         said, situation = request.instruction.text, request.context.situation
@@ -242,7 +243,7 @@ class EmbeddedParameters:
             return declined(self, found.words, begun, intent=intent, raw=settled.written.text)
         found, why = _at_pace(found, intent, request)
         thoughts = thoughts_of(linked.meanings, linked.choice, settled.situation, used, does=does(found))
-        words = " ".join((*why, thoughts.text, *_overruled(request.history, used)))
+        words = " ".join((*why, thoughts, *_overruled(request.history, used)))
         plan = self._plan(found, words, intent, request, begun, used)
         return replace(plan, usage=usage_of(settled.written), raw=settled.written.text)
 
@@ -296,15 +297,8 @@ class EmbeddedParameters:
         begun: float,
         used: Sequence[Leaning] = (),
     ) -> Plan:
-        return Plan(
-            thoughts=Thoughts(words),
-            policy=found,
-            intent=intent,
-            settings=_settings(found, request.context.situation, used),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-        )
+        settings = _settings(found, request.context.situation, used)
+        return planned(self, words, found, begun, intent=intent, settings=settings)
 
 
 def _spot_read(wish: str, settled: Settled | Plan, hint: Hint | None) -> str:

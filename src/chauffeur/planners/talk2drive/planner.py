@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from chauffeur.concept import (
@@ -19,13 +20,13 @@ from chauffeur.concept import (
     Limits,
     Plan,
     PlanRequest,
-    Thoughts,
     Usage,
 )
 from chauffeur.concept.units import kmh
 from chauffeur.memory.conflicts import conflicts_in
-from chauffeur.planners.base import OnText, Planner, Prompt, Prompting, Prose, Writer, declined
-from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_turn
+from chauffeur.planners.base import OnText, Planner, Prompt, Prompting, Prose, Writer, declined, planned
+from chauffeur.planners.llm_repair import asked_and_repaired
+from chauffeur.planners.prompts import Message, data_block, wish_turn
 from chauffeur.planners.prompts.system import fill, template
 from chauffeur.planners.talk2drive.answer import ParametersAnswer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
@@ -102,16 +103,10 @@ class Talk2DrivePlanner:
         if not request.instruction.text.strip():
             raise InstructionError("The instruction is empty.", hint="Say what you want the car to do.")
         begun = time.perf_counter()
-        messages = messages_for(request)
-        prose = await self._writer.write(messages)
-        usage, answer = prose.usage, _read(prose)
-        for _ in range(self._repairs):
-            findings = _findings(answer, request)
-            if not findings:
-                break
-            messages = [*messages, *repair_turns(prose.text, findings, ask=_ASK_AGAIN)]
-            prose = await self._writer.write(messages)
-            usage, answer = _sum(usage, prose.usage), _read(prose)
+        findings = partial(_findings, request=request)
+        answer, prose, usage = await asked_and_repaired(
+            self._writer.write, messages_for(request), _read, findings, repairs=self._repairs, ask=_ASK_AGAIN
+        )
         return self._plan(request, answer, prose, usage, begun)
 
     def prompt(self, request: PlanRequest) -> Prompt:
@@ -131,14 +126,14 @@ class Talk2DrivePlanner:
             return declined(self, words, begun, intent=intent, usage=usage, raw=prose.text)
         goal = goal_of(request)
         speed = {"target_speed_mps": round(answer.parameters.target_speed_mps, 3)}
-        return Plan(
-            thoughts=Thoughts(answer.thoughts),
-            policy=answer.parameters,
+        return planned(
+            self,
+            answer.thoughts,
+            answer.parameters,
+            begun,
             intent=goal.intent,
-            planner=self.id,
             model=prose.model,
             settings=tuple((speed | dict(goal.settings)).items()),
-            latency_s=time.perf_counter() - begun,
             usage=usage,
             raw=prose.text,
         )
@@ -196,13 +191,3 @@ def _item(item: HistoryItem) -> str:
     rows = (("Date", item.when[:10]), ("Command", item.instruction), ("Action", item.policy), ("Evaluation", said))
     # One line a row, so that words from outside cannot pass for a row of their own.
     return "\n".join(f"{label}: {' '.join(text.split())}" for label, text in rows if text)
-
-
-def _sum(one: Usage, other: Usage) -> Usage:
-    return Usage(
-        prompt_tokens=one.prompt_tokens + other.prompt_tokens,
-        completion_tokens=one.completion_tokens + other.completion_tokens,
-        cost_usd=None if one.cost_usd is None or other.cost_usd is None else one.cost_usd + other.cost_usd,
-        requests=one.requests + other.requests,
-        cached=one.cached and other.cached,
-    )

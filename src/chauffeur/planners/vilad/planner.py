@@ -22,11 +22,10 @@ from chauffeur.concept import (
     Plan,
     PlanRequest,
     Street,
-    Thoughts,
     Usage,
 )
 from chauffeur.language.corrections import last_said
-from chauffeur.planners.base import declined
+from chauffeur.planners.base import declined, planned
 from chauffeur.planners.onboard.town import town_destination
 from chauffeur.planners.onboard.town_steps import landmark_in
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
@@ -137,15 +136,15 @@ class ViladPlanner:
             alarm: Alarm = "stop" if asked["halt"] == "stop" and anywhere else ""
             return replace(refused, model=engine.version, alarm=alarm)
         limit = request.context.situation.speed_limit_mps
-        return Plan(
-            thoughts=Thoughts(drive_words(street, written.values)),
-            policy=trajectory_of(street, written.values, request.limits, limit),
+        return planned(
+            self,
+            drive_words(street, written.values),
+            trajectory_of(street, written.values, request.limits, limit),
+            begun,
             intent=intent_of(asked),
-            planner=self.id,
             model=engine.version,
             settings=(("passes", float(written.decided.passes)), ("agreed", float(written.agreed))),
             usage=usage,
-            latency_s=time.perf_counter() - begun,
             raw=written.raw,
         )
 
@@ -180,19 +179,15 @@ class ViladPlanner:
             said = f"You want a spot {in_words(asked)}{missing}. {names[candidate - 1]} is the best of the free ones."
         name = names[candidate - 1]
         speed = min(SPEED_MPS, request.limits.most_mps(request.context.situation.speed_limit_mps))
-        return Plan(
-            thoughts=Thoughts(f"{said} I drive there at {speed:.1f} m/s."),
-            policy=Parameters(speed, LOOK_AHEAD_M, LOOK_AHEAD_S, route=name),
+        return planned(
+            self,
+            f"{said} I drive there at {speed:.1f} m/s.",
+            Parameters(speed, LOOK_AHEAD_M, LOOK_AHEAD_S, route=name),
+            begun,
             intent="park",
-            planner=self.id,
             model=self._parking_engine.version,
-            settings=(
-                ("target_speed_mps", speed),
-                ("passes", float(decided.passes)),
-                ("agreed", float(agreed)),
-            ),
+            settings=(("target_speed_mps", speed), ("passes", float(decided.passes)), ("agreed", float(agreed))),
             usage=_usage(decided.passes),
-            latency_s=time.perf_counter() - begun,
             raw=written,
         )
 

@@ -16,10 +16,10 @@ from chauffeur.concept import (
     Plan,
     PlanRequest,
     Situation,
-    Thoughts,
     Usage,
 )
 from chauffeur.language.weather import FOG, RAIN, SNOW, UNKNOWN, said_weather, weather_of, without_said_weather
+from chauffeur.planners.base import planned
 from chauffeur.planners.camera_faults import camera_fault
 from chauffeur.planners.motion import settings_of
 from chauffeur.planners.prompts.motion import matrix_words
@@ -103,9 +103,11 @@ class VlmPlanner:
         self._earlier = request.images[-1] if request.images else None
         made = self._blind(text, given, fault) if fault else self._seeing(text, given, request, recall)
         read = made.read
-        return Plan(
-            thoughts=Thoughts(f"{made.thoughts}{taste_words(made.shift)}"),
-            policy=made.policy,
+        return planned(
+            self,
+            f"{made.thoughts}{taste_words(made.shift)}",
+            made.policy,
+            begun,
             intent=INTENT,
             settings=(
                 *settings_of(made.policy),
@@ -114,10 +116,7 @@ class VlmPlanner:
                 (STYLE_SETTING, float(STYLES.index(read.values["style"]))),
                 (WEATHER_SETTING, float(SEEN_WEATHERS.index(read.values["weather"]))),
             ),
-            planner=self.id,
-            model=self.model,
             usage=Usage(completion_tokens=read.passes, requests=1),
-            latency_s=time.perf_counter() - begun,
             raw=f"{read.text}\nP = {matrix_words(made.policy)}",
             scene=made.scene,
         )

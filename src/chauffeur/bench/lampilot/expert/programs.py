@@ -24,6 +24,7 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from string import Template
 from typing import Any, Final
 
 import numpy as np
@@ -38,12 +39,12 @@ _SHARED = "chauffeur.planners.onboard.exemplars"
 
 def filled(name: str, values: Mapping[str, str]) -> str:
     """A program's text. Raises KeyError for an unknown program or a value that is missing."""
-    return texts.filled(_texts(), name, values)
+    return Template(_texts()[name]).substitute(values)
 
 
 def open_names(name: str) -> frozenset[str]:
     """Names of the values a program's text asks for."""
-    return texts.open_names(_texts(), name)
+    return frozenset(Template(_texts()[name]).get_identifiers())
 
 
 @cache

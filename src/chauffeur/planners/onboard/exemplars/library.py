@@ -11,10 +11,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from string import Template
 
-from chauffeur.planners.onboard.exemplars.crossing import DONE_M, ON_THE_WAY_M, crossing_program
+from chauffeur.planners.onboard.exemplars.crossing import DONE_M, ON_THE_WAY_M, PACKAGE, crossing_program
+from chauffeur.planners.onboard.exemplars.texts import sections
 
 FILES = ("speed", "gap", "road", "turn", "stop", "style")
 _HOLD = "#: hold"
@@ -52,18 +52,18 @@ class Filled:
 @cache
 def exemplars() -> Mapping[str, Exemplar]:
     """All exemplars by id, in the order of the files."""
-    snippets = dict(_sections("snippets"))
-    return {name: _exemplar(name, body, snippets) for file in FILES for name, body in _sections(file)}
+    snippets = sections(PACKAGE, "snippets")
+    return {name: _exemplar(name, body, snippets) for file in FILES for name, body in sections(PACKAGE, file).items()}
 
 
 def program_of(steps: Sequence[Filled]) -> str:
     """Program text that does the steps one after the other."""
     if len(steps) == 1:
-        return _filled(steps[0], whole=True)
+        return function_of(steps[0], whole=True)
     parts: list[str] = []
     names: list[str] = []
     for index, step in enumerate(steps):
-        text = _filled(step, whole=index == len(steps) - 1)
+        text = function_of(step, whole=index == len(steps) - 1)
         name = _function(step)
         unique = name if name not in names else f"{name}_{index + 1}"
         parts.append(text.replace(f"def {name}():", f"def {unique}():", 1))
@@ -79,11 +79,6 @@ def _function(step: Filled) -> str:
     return exemplars()[step.id].function
 
 
-def function_of(step: Filled, *, whole: bool) -> str:
-    """The function of one step; without `whole`, only what brings the manoeuvre about."""
-    return _filled(step, whole=whole)
-
-
 def number(value: float) -> str:
     """A number as the programs and the thoughts write it: two digits at most, one at least, whole counts plain."""
     if isinstance(value, int):
@@ -92,7 +87,8 @@ def number(value: float) -> str:
     return text[:-1] if text.endswith("0") else text
 
 
-def _filled(step: Filled, *, whole: bool) -> str:
+def function_of(step: Filled, *, whole: bool) -> str:
+    """The function of one step; without `whole`, only what brings the manoeuvre about."""
     kind, _, side = step.id.partition(".")
     if kind == "crossing":
         return crossing_program(side, {**step.numbers, "END": DONE_M if whole else ON_THE_WAY_M})
@@ -101,12 +97,6 @@ def _filled(step: Filled, *, whole: bool) -> str:
         text = text[: text.index(_HOLD)].rstrip() + "\n"
     lines = [line for line in text.splitlines() if line.strip() != _HOLD]
     return Template("\n".join(lines) + "\n").substitute({k: number(v) for k, v in step.numbers.items()})
-
-
-def _sections(file: str) -> list[tuple[str, str]]:
-    text = resources.files("chauffeur.planners.onboard.exemplars").joinpath(f"{file}.lmp").read_text(encoding="utf-8")
-    parts = re.split(r"^### (.+)\n", text, flags=re.MULTILINE)[1:]
-    return list(zip(parts[::2], parts[1::2], strict=True))
 
 
 def _exemplar(name: str, body: str, snippets: Mapping[str, str]) -> Exemplar:

@@ -10,33 +10,23 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from string import Template
 
 _HELPER = re.compile(r"^@(\w+)\n", re.MULTILINE)
-
-
-def filled(texts: Mapping[str, str], name: str, values: Mapping[str, str]) -> str:
-    """A program's text. Raises KeyError for an unknown program or a value that is missing."""
-    return Template(texts[name]).substitute(values)
-
-
-def open_names(texts: Mapping[str, str], name: str) -> frozenset[str]:
-    """Names of the values a program's text asks for."""
-    return frozenset(Template(texts[name]).get_identifiers())
 
 
 @cache
 def read_texts(package: str, files: tuple[str, ...], helpers: str) -> Mapping[str, str]:
     """The programs of some files of a package, with the helpers of another package's `common.lmp` put in."""
-    common = _sections(helpers, "common")
+    common = sections(helpers, "common")
     texts: dict[str, str] = {}
     for file in files:
-        for name, body in _sections(package, file).items():
+        for name, body in sections(package, file).items():
             texts[name] = _HELPER.sub(lambda match: f"{common[match[1]].strip()}\n\n\n", body).strip() + "\n"
     return texts
 
 
-def _sections(package: str, file: str) -> dict[str, str]:
+def sections(package: str, file: str) -> dict[str, str]:
+    """The texts of an `.lmp` file by name, in its order."""
     text = resources.files(package).joinpath(f"{file}.lmp").read_text(encoding="utf-8")
-    parts = re.split(r"^### (\w+)\n", text, flags=re.MULTILINE)[1:]
+    parts = re.split(r"^### (.+)\n", text, flags=re.MULTILINE)[1:]
     return dict(zip(parts[::2], parts[1::2], strict=True))
