@@ -38,12 +38,23 @@ from chauffeur.models.net.transformer import parameter_count
 from chauffeur.models.vilad.decoding import AdaptiveCached, PrefixCached, Refresh, Twin, Uncached
 from chauffeur.models.vilad.network import SIZES, Vilad, ViladConfig
 from chauffeur.planners.vilad.parking import TEMPLATE
-from chauffeur.planners.vilad.template import ActionSlot, ActionTemplate, digit_slots
+from chauffeur.planners.vilad.template import ActionSlot, ActionTemplate
 from chauffeur.planners.vilad.unmasking import Unmasking, unmask
 from vilad_limits import Limit, Machine, diffusion_passes, limit, machine, twin_passes
 from vilad_speed_svg import drawn
 
 WORDS, SCENE = 96, 27
+
+
+def digit_slots(name: str, whole: int, decimals: int) -> tuple[str | ActionSlot, ...]:
+    """A signed number as the paper writes waypoints, digit by digit: +12.5 for whole=2, decimals=1.
+
+    The planners write one token a quantity instead (see `planners/vilad/template.py`).
+    """
+    digits = tuple("0123456789")
+    front = tuple(ActionSlot(f"{name}.{i}", digits) for i in range(whole))
+    back = tuple(ActionSlot(f"{name}.-{i + 1}", digits) for i in range(decimals))
+    return (ActionSlot(f"{name}.sign", ("+", "-")), *front, ".", *back)
 
 
 def waypoints(count: int) -> ActionTemplate:

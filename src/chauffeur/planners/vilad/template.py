@@ -179,14 +179,3 @@ class ActionTemplate:
         return " ".join(
             self.words[int(token)] if int(token) < self.size else f"#{int(token) - self.size}" for token in row
         )
-
-
-def digit_slots(name: str, whole: int, decimals: int) -> tuple[str | ActionSlot, ...]:
-    """A signed number as the paper writes waypoints, digit by digit: +12.5 for whole=2, decimals=1.
-
-    Kept for parity with the paper; one token a quantity is the better way (see the module).
-    """
-    digits = tuple("0123456789")
-    front = tuple(ActionSlot(f"{name}.{i}", digits) for i in range(whole))
-    back = tuple(ActionSlot(f"{name}.-{i + 1}", digits) for i in range(decimals))
-    return (ActionSlot(f"{name}.sign", ("+", "-")), *front, ".", *back)
