@@ -25,6 +25,7 @@ from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.arbitration import PACES, denied_intent, slow_speed_words, within_mood
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.choose_speed import choose_style
+from chauffeur.planners.onboard.doubts import ENGLISH_ONLY
 from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.options import Chosen, Options
 from chauffeur.planners.onboard.personal import Leaning
@@ -138,6 +139,14 @@ def test_a_sorter_is_believed_where_it_goes_the_way_that_was_said(planners: dict
     ):
         found = plan(planners["talk2drive"], wish, situation)
         assert found.policy is not None and found.intent.startswith(intent), (wish, found.intent)
+
+
+@pytest.mark.parametrize("name", _PLANNERS)
+@pytest.mark.parametrize("wish", ["Pouvez-vous doubler ce camion ?", "请开慢一点。"])
+def test_another_language_is_not_guessed_at(planners: dict[str, Planner], name: str, wish: str) -> None:
+    found = plan(planners[name], wish, LEFT)
+    assert found.policy is None
+    assert found.refusal == ENGLISH_ONLY
 
 
 def test_where_nobody_can_answer_the_best_reading_is_driven(planners: dict[str, Planner]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from parameters_asked import BEHIND, LEFT, LOT, driven, plan
 
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
-from chauffeur.planners.talk2drive.explicit_overtake import told
 
 
 @pytest.fixture(scope="module")
@@ -17,52 +16,10 @@ def planner() -> Planner:
     return make_planner("talk2drive")
 
 
-PASS = (
-    "Pass the RV, please and thank you.",
-    "I want that you overtake this coach.",
-    "Why don't you pass him?",
-    "Why not pass this guy?",
-    "Can't you pass him?",
-    "Don't you want to overtake?",
-    "Don't just sit there, pass him.",
-    "Don't stay behind him.",
-    "Speed up a little and get around Grandpa here.",
-    "Would you mind overtaking the tractor?",
-)
-STAY = (
-    "Would it be possible not to overtake that motorhome?",
-    "This horse trailer in front, please don't pass, the horses get scared.",
-    "Be patient and wait behind that tour bus.",
-    "We're with that church van, so don't get ahead of it.",
-    "Don't you dare pass him.",
-    "Could you please not go past that lady?",
-    "No overtaking today, please.",
-    "Stay put behind the cement truck.",
-)
-NEITHER = (
-    "Why are we passing him?",
-    "Can we not pass this one?",
-    "If he brakes, pass him.",
-    "Wait a minute, then overtake.",
-    "Overtake him in half a minute.",
-    "Pass the salt.",
-    "Could you pass me my bag?",
-    "They are passing us all the time.",
-    "Let him go past.",
-    "Nobody wants to stay behind a truck.",
-    "Don't hold back, pick up speed.",
-    "",
-)
-
-
-@pytest.mark.parametrize(("wishes", "found"), [(PASS, "pass"), (STAY, "stay"), (NEITHER, "")])
-def test_what_is_said_outright(wishes: tuple[str, ...], found: str) -> None:
-    assert {wish: told(wish) for wish in wishes} == dict.fromkeys(wishes, found)
-
-
-@given(st.text(max_size=60))
-def test_it_is_one_of_three(text: str) -> None:
-    assert told(text) in ("pass", "stay", "")
+ROWS = [
+    line.split("\t") for line in (Path(__file__).parents[1] / "language/wordings.tsv").read_text("utf-8").splitlines()
+]
+PASS, STAY = ([text for reader, text, kind in ROWS if (reader, kind) == ("overtake", one)] for one in ("pass", "stay"))
 
 
 @pytest.mark.parametrize("wish", PASS)
@@ -94,14 +51,8 @@ def test_a_lane_and_its_speed_are_one_wish(planner: Planner) -> None:
     assert plan(planner, "Slow down to 20 m/s, then overtake.", BEHIND).policy is None
 
 
-@pytest.mark.parametrize(
-    ("wish", "lane"),
-    [
-        ("Two more miles and it's exit only on the far side.", 1),
-    ],
-)
-def test_how_far_an_exit_is_is_no_gap(planner: Planner, wish: str, lane: int) -> None:
-    assert driven(planner, wish, LEFT).lane == lane
+def test_how_far_an_exit_is_is_no_gap(planner: Planner) -> None:
+    assert driven(planner, "Two more miles and it's exit only on the far side.", LEFT).lane == 1
 
 
 @pytest.mark.parametrize("wish", ["Keep 40 metres to the car ahead.", "Drop back by 12 m behind that estate."])
