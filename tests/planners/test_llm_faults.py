@@ -39,28 +39,57 @@ def test_401_names_the_variable_and_is_not_tried_again(server, bench, secret):
     assert "wants a key" in failure(bench).hint
 
 
-def test_404_names_the_model_and_how_to_list_them(server, bench):
-    server.script(fails(404, "The model `m` does not exist", code="model_not_found"))
+@pytest.mark.parametrize(
+    ("status", "code", "kind", "hint"),
+    [
+        (400, None, "bad_request", ""),
+        (403, None, "forbidden", "access"),
+        (404, "model_not_found", "not_found", "/models"),
+        (429, "insufficient_quota", "quota", "billing"),
+        (501, None, "bad_request", ""),
+    ],
+)
+def test_a_final_refusal_is_told_in_the_servers_words_and_not_tried_again(server, bench, status, code, kind, hint):
+    server.script(fails(status, "the moon is full", code=code))
     error = failure(bench)
-    assert (error.kind, error.retryable) == ("not_found", False)
-    assert "'m'" in error.message and f"curl {server.url}/models" in error.hint
+    assert (error.kind, error.retryable, len(server.requests), bench.waits) == (kind, False, 1, [])
+    assert "the moon is full" in error.message and hint in error.hint
 
 
-def test_403_400_and_501_are_final(server, bench):
-    for status, kind in ((403, "forbidden"), (400, "bad_request"), (501, "bad_request")):
-        server.script(fails(status, "the moon is full"))
-        error = failure(bench)
-        assert (error.kind, error.retryable) == (kind, False)
-        assert "the moon is full" in error.message
-    assert bench.waits == []
-
-
-def test_429_waits_at_least_as_long_as_the_server_asks(server, bench):
-    server.script(fails(429, Retry_After="7"), stream(REPLY))
+@pytest.mark.parametrize(
+    ("answers", "waits"),
+    [
+        ((fails(429, Retry_After="7"),), [(7.0, 7.5)]),
+        ((fails(500), fails(503)), [(0.25, 0.5), (0.5, 1.0)]),
+        ((events(chunk(REPLY[:40]), chunk(REPLY[40:80])),), [(0.25, 0.5)]),
+        ((reset_after(chunk(REPLY[:40])),), [(0.25, 0.5)]),
+    ],
+)
+def test_what_may_pass_is_tried_again_after_a_wait(server, bench, answers, waits):
+    server.script(*answers, stream(REPLY))
     plan = bench.plan()
     assert plan.policy == Program(PROGRAM)
-    assert plan.usage.requests == 2
-    assert len(bench.waits) == 1 and 7.0 <= bench.waits[0] <= 7.5
+    assert plan.usage.requests == 1 + len(answers)
+    assert len(bench.waits) == len(waits)
+    assert all(low <= wait <= high for wait, (low, high) in zip(bench.waits, waits, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("answer", "kind", "words"),
+    [
+        (fails(500, "the GPU fell off"), "server", "the GPU fell off"),
+        (events(chunk(REPLY[:40]), chunk(REPLY[40:80])), "truncated", "broke off"),
+        (reset_after(chunk(REPLY[:40])), "broken", ""),
+    ],
+)
+def test_what_does_not_pass_ends_after_the_same_waits(server, bench, answer, kind, words):
+    server.script(answer)
+    error = failure(bench)
+    first, bench.waits = bench.waits, []
+    assert (error.kind, error.retryable, len(server.requests)) == (kind, True, 4)
+    assert words in error.message and "Tried 4 times." in error.message
+    failure(bench)
+    assert bench.waits == first and len(set(first)) == 3
 
 
 def test_a_wait_beyond_our_patience_fails_at_once_and_says_so(server, bench):
@@ -71,63 +100,27 @@ def test_a_wait_beyond_our_patience_fails_at_once_and_says_so(server, bench):
     assert bench.waits == []
 
 
-def test_an_account_without_quota_is_not_tried_again(server, bench):
-    server.script(fails(429, "You exceeded your current quota", code="insufficient_quota"))
-    assert failure(bench).kind == "quota"
-    assert len(server.requests) == 1
+_DRIPPING = events(*(chunk("x") for _ in range(1000)), pause_s=0.02)
 
 
-def test_500_then_success(server, bench):
-    server.script(fails(500), fails(503), stream(REPLY))
-    assert bench.plan().policy is not None
-    assert 0.25 <= bench.waits[0] <= 0.5 and 0.5 <= bench.waits[1] <= 1.0
-
-
-def test_500_forever_ends(server, bench):
-    server.script(fails(500, "the GPU fell off"))
-    error = failure(bench, retry=RetryPolicy(attempts=3))
-    assert (error.kind, error.retryable) == ("server", True)
-    assert "the GPU fell off" in error.message and "Tried 3 times." in error.message
-    assert len(server.requests) == 3 and len(bench.waits) == 2
-
-
-def test_the_same_seed_waits_the_same(server, bench):
-    server.script(fails(500))
-    failure(bench)
-    first, bench.waits = bench.waits, []
-    failure(bench)
-    assert bench.waits == first and len(set(first)) == 3
-
-
-def test_no_first_byte_in_time(server, bench):
-    server.script(silent(5.0))
+@pytest.mark.parametrize("answer", [silent(5.0), _DRIPPING])
+@pytest.mark.parametrize(
+    ("temperature", "limits", "words", "requests"),
+    [
+        (0.0, {"timeout_s": 0.15, "retry": RetryPolicy(attempts=2)}, "Not asked again", 1),
+        (0.7, {"timeout_s": 0.15, "retry": RetryPolicy(attempts=2)}, "Tried 2 times", 2),
+        (0.7, {"timeout_s": 0.1, "budget_s": 0.25}, "within 0.25 s", None),  # as many as there is time for
+    ],
+)
+def test_a_reply_that_does_not_end_is_bounded_and_asked_again_where_it_may_come_out_otherwise(
+    server, bench, answer, temperature, limits, words, requests
+):
+    server.script(answer)
     started = time.monotonic()
-    error = failure(bench, timeout_s=0.15, retry=RetryPolicy(attempts=2))
-    assert (error.kind, error.retryable) == ("timeout", False)
-    assert "Not asked again" in error.message and "CHAUFFEUR_TIMEOUT_S=0.6" in error.hint
-    assert len(server.requests) == 1
-    assert time.monotonic() - started < 2.0
-
-
-def test_what_may_come_out_otherwise_is_asked_again_after_a_time_out_and_that_is_said(server, bench, caplog):
-    server.script(silent(5.0))
-    error = failure(bench, timeout_s=0.1, retry=RetryPolicy(attempts=2), sampling=Sampling(temperature=0.7))
-    assert error.retryable and len(server.requests) == 2
-    assert "The request is sent again." in caplog.text
-
-
-def test_a_stream_that_drips_for_ever_is_bounded_as_a_whole(server, bench):
-    server.script(events(*(chunk("x") for _ in range(1000)), pause_s=0.02))
-    started = time.monotonic()
-    assert failure(bench, timeout_s=0.3, retry=RetryPolicy(attempts=1)).kind == "timeout"
-    assert time.monotonic() - started < 2.0
-
-
-def test_a_plan_has_a_budget_for_everything_together(server, bench):
-    server.script(silent(5.0))
-    started = time.monotonic()
-    error = failure(bench, timeout_s=0.1, budget_s=0.25, sampling=Sampling(temperature=0.7))
-    assert error.kind == "timeout" and "0.25 s" in error.message
+    error = failure(bench, sampling=Sampling(temperature=temperature), **limits)
+    assert error.kind == "timeout" and words in error.message
+    assert "CHAUFFEUR_TIMEOUT_S" in error.hint
+    assert requests is None or len(server.requests) == requests
     assert time.monotonic() - started < 2.0
 
 
@@ -136,23 +129,6 @@ def test_a_slow_stream_within_the_time_is_fine(server, bench):
         events(*(chunk(REPLY[i : i + 20]) for i in range(0, len(REPLY), 20)), chunk(finish="stop"), DONE, pause_s=0.01)
     )
     assert bench.plan().policy == Program(PROGRAM)
-
-
-def test_a_truncated_stream_is_never_taken_for_an_answer(server, bench):
-    cut = events(chunk(REPLY[:40]), chunk(REPLY[40:80]))
-    server.script(cut)
-    error = failure(bench)
-    assert (error.kind, error.retryable) == ("truncated", True)
-    server.script(cut, stream(REPLY))
-    assert bench.plan().policy == Program(PROGRAM)
-
-
-def test_a_reset_in_the_middle_is_tried_again(server, bench):
-    server.script(reset_after(chunk(REPLY[:40])), stream(REPLY))
-    assert bench.plan().policy == Program(PROGRAM)
-    server.script(reset_after(chunk(REPLY[:40])))
-    error = failure(bench)
-    assert (error.kind, error.retryable) == ("broken", True)
 
 
 @pytest.mark.parametrize(

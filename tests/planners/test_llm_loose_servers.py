@@ -6,7 +6,6 @@ import asyncio
 import gzip
 import io
 import json
-import logging
 import time
 import zlib
 from collections.abc import Callable
@@ -17,7 +16,6 @@ import zstandard
 from server import DONE, PROGRAM, REPLY, Exchange, body, chunk, events, fails, stream, whole
 
 from chauffeur.concept import Program
-from chauffeur.planners.llm_endpoint import Sampling
 from chauffeur.planners.llm_errors import EndpointError
 from chauffeur.planners.llm_model import ChatModel
 from chauffeur.planners.llm_retry import RetryPolicy
@@ -379,17 +377,6 @@ def test_a_short_key_masks_no_letters_of_a_reply_and_no_words_of_an_error(server
     assert bench.plan().raw == reply
     server.script(fails(400, "max exceeded; your key is x."))
     assert "max exceeded; your key is ***" in failure(bench).message
-
-
-def test_a_time_out_at_temperature_0_is_not_asked_again_and_one_above_is(server, bench, caplog):
-    caplog.set_level(logging.WARNING)
-    server.script(events(*(chunk("x") for _ in range(1000)), pause_s=0.05))
-    with pytest.raises(EndpointError, match="Not asked again"):
-        bench.plan(timeout_s=0.2)
-    assert len(server.requests) == 1
-    with pytest.raises(EndpointError, match="Tried 2 times"):
-        bench.plan(timeout_s=0.2, sampling=Sampling(temperature=0.5), retry=RetryPolicy(attempts=2))
-    assert len(server.requests) == 3
 
 
 def test_a_model_that_repeats_its_refused_answer_is_not_asked_for_ever(server, bench):
