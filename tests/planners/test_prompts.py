@@ -45,10 +45,6 @@ def test_limits_are_told():
     assert "whatever the sign" not in describe_limits(Limits())
 
 
-def test_the_documentation_can_be_another_worlds():
-    assert "def fly() -> None:" in build_system_message(api_docs="def fly() -> None:").text
-
-
 @pytest.mark.parametrize("limits", [Limits(), LAMPILOT_LIMITS, Limits(max_over_limit_mps=0.0, min_time_headway_s=1.0)])
 def test_the_examples_pass_the_gate_and_keep_the_limits(limits):
     from chauffeur.programs.gate import check_source

@@ -79,7 +79,7 @@ def within_mood(speed_mps: float, pace: int, now_mps: float, most_mps: float) ->
 def intent_pace(intent: str) -> int:
     """The pace that the tag of a wish without a number asks for."""
     kinds = {"speed.increase": 1, "speed.decrease": -1, **{f"style.{mood}": sign for mood, sign in PACES.items()}}
-    return _sign(kinds.get(part, 0) for part in intent.split("+"))
+    return one_sign(kinds.get(part, 0) for part in intent.split("+"))
 
 
 def wary_of(text: str, intent: str) -> bool:
@@ -185,6 +185,7 @@ def undenied(planner: Planner, plan: Plan, request: PlanRequest, begun: float, *
     return asked(planner, question, begun, offer=offer, raw=plan.raw)
 
 
-def _sign(changes: Iterable[int]) -> Literal[-1, 0, 1]:
+def one_sign(changes: Iterable[int]) -> Literal[-1, 0, 1]:
+    """The sign that all changes share, zeros apart; 0 where they differ or there is none."""
     found = {change for change in changes if change}
     return 0 if len(found) != 1 else 1 if found.pop() > 0 else -1

@@ -14,24 +14,10 @@ from chauffeur.foreign.complaints import ForeignBodyError, server_words
 from chauffeur.planners.prompts.blocks import cap, clean
 
 Kind = Literal[
-    "no_key",
-    "unauthorized",
-    "forbidden",
-    "not_found",
-    "bad_request",
-    "no_vision",
-    "context",
-    "rate_limit",
-    "quota",
-    "server",
-    "timeout",
-    "dns",
-    "unreachable",
-    "broken",
-    "truncated",
-    "garbage",
-    "not_an_api",
-]
+    "no_key", "unauthorized", "forbidden", "not_found", "bad_request", "no_vision", "context", "rate_limit", "quota",
+    "server", "timeout", "dns", "unreachable", "broken", "truncated", "garbage", "not_an_api",
+]  # fmt: skip
+"""What went wrong."""
 
 _TELLS = re.compile(r"[\w\"'(]")
 """How a server's own words begin; a page of a proxy in between is looked through, and shown to no one."""

@@ -45,16 +45,6 @@ class LlmSettings:
         return self.budget_s or max(_PLAN_S, self.timeout_s * (1 + self.repairs))
 
 
-VARIABLES: Final[dict[str, str]] = {
-    "temperature": "CHAUFFEUR_TEMPERATURE",
-    "max_tokens": "CHAUFFEUR_MAX_TOKENS",
-    "timeout_s": "CHAUFFEUR_TIMEOUT_S",
-    "attempts": "CHAUFFEUR_ATTEMPTS",
-    "repairs": "CHAUFFEUR_REPAIRS",
-    "budget_s": "CHAUFFEUR_BUDGET_S",
-}
-"""Environment variable of each setting."""
-
 _RANGES: Final[dict[str, tuple[float, float]]] = {
     "temperature": (0.0, 2.0),
     "max_tokens": (1, 1_000_000),
@@ -63,6 +53,8 @@ _RANGES: Final[dict[str, tuple[float, float]]] = {
     "repairs": (0, 5),
     "budget_s": (0.001, 86_400.0),
 }
+VARIABLES: Final[dict[str, str]] = {name: f"CHAUFFEUR_{name.upper()}" for name in _RANGES}
+"""Environment variable of each setting."""
 _WHOLE: Final = ("max_tokens", "attempts", "repairs")
 
 

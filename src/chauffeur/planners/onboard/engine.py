@@ -7,16 +7,17 @@ is left out, and what the grammar leaves no choice about is not asked of the net
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
+import llguidance
 import numpy as np
 
-from chauffeur.concept import DataError, MissingExtraError
+from chauffeur.concept import DataError
+from chauffeur.planners.exported import open_exported
 from chauffeur.planners.onboard.prompt import END
 from chauffeur.planners.onboard.reply import grammar
 
@@ -57,28 +58,11 @@ class Engine:
 
         Raises:
             DataError: A file is missing or damaged.
-            MissingExtraError: ONNX Runtime or the grammar engine is not installed.
         """
         try:
-            import llguidance
-            import onnxruntime
-        except ImportError as error:
-            raise MissingExtraError(
-                f"The on-board model needs {error.name}.",
-                hint="Run: pip install onnxruntime llguidance; or drive with --planner keyword.",
-            ) from error
-        self._llguidance: Any = llguidance
-        try:
-            self.about: dict[str, Any] = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+            self.about, self._session = open_exported(folder, threads)
             tokenizer_text = (folder / "tokenizer.json").read_text(encoding="utf-8")
-            options = onnxruntime.SessionOptions()
-            options.intra_op_num_threads = threads
-            options.inter_op_num_threads = 1
-            options.log_severity_level = 3
-            self._session: Any = onnxruntime.InferenceSession(
-                str(folder / "model.onnx"), options, providers=["CPUExecutionProvider"]
-            )
-        except (OSError, ValueError) as error:
+        except Exception as error:  # the runtime raises types of its own for a damaged graph
             raise DataError(f"The on-board model in {folder} cannot be read: {error}.") from error
         self._tokenizer: Any = llguidance.LLTokenizer(tokenizer_text)
         (self._end,) = self._tokenizer.tokenize_str(END)
@@ -93,11 +77,11 @@ class Engine:
     def _programs(self) -> Any:
         return self._matcher(only_program=True)
 
-    def _matcher(self, *, only_program: bool, measures: tuple[str, ...] = ()) -> Any:
+    def _matcher(self, *, only_program: bool) -> Any:
         """At the beginning of a reply: kept and copied, because reading the grammar takes longer than most replies."""
         questions, reasons = tuple(self.about["questions"]), tuple(self.about["reasons"])
-        text = grammar(questions, reasons, only_program=only_program, measures=measures)
-        matchers = self._llguidance.LLMatcher
+        text = grammar(questions, reasons, only_program=only_program)
+        matchers: Any = llguidance.LLMatcher
         return matchers(self._tokenizer, matchers.grammar_from_lark(text))
 
     def write(
@@ -105,7 +89,6 @@ class Engine:
         prompt: str,
         *,
         only_program: bool = False,
-        measures: tuple[str, ...] = (),
         constrained: bool = True,
         told: Callable[[str], None] | None = None,
     ) -> Written:
@@ -114,15 +97,11 @@ class Engine:
         Args:
             prompt: As `prompt.prompt` makes it.
             only_program: Whether questions and refusals are left out.
-            measures: The only numbers that may stand for a speed, a distance or a time; empty for any.
             constrained: Whether the grammar holds; without it, whatever the network prefers.
             told: Called with each piece of text as it comes.
         """
         ids: list[int] = self._tokenizer.tokenize_str(prompt)[-MAX_PROMPT_TOKENS:]
-        if measures:
-            matcher = self._matcher(only_program=only_program, measures=measures)
-        else:
-            matcher = (self._programs if only_program else self._replies).deep_copy()
+        matcher = (self._programs if only_program else self._replies).deep_copy()
         keys = values = self._empty
         feed = ids
         out: list[int] = []

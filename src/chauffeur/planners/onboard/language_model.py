@@ -48,7 +48,6 @@ def answer(
     history: Sequence[str],
     wish: str,
     *,
-    constrained: bool = True,
     on_text: OnText | None = None,
 ) -> tuple[OnboardReply, Written]:
     """What the model says to a wish: steps, a question, or a refusal.
@@ -58,11 +57,10 @@ def answer(
         situation: Where we are.
         history: Remembered trips as the prompt has them.
         wish: The passenger's words.
-        constrained: Whether decoding holds to the grammar.
         on_text: Gets each piece of text as the model writes it.
 
     Raises:
-        ProgramError: What it wrote is no reply; only without the grammar.
+        ProgramError: What it wrote is no reply: it came to no end in time.
     """
 
     def write(attempt: int, text: str, **how: Any) -> tuple[OnboardReply, Written]:
@@ -70,7 +68,7 @@ def answer(
         written = engine.write(text, told=told, **how)
         return read_reply(written.text), written
 
-    reply, written = write(1, prompt(situation, history, wish), constrained=constrained)
+    reply, written = write(1, prompt(situation, history, wish))
     if reply.refusal in engine.about.get("checked", ()):
         # Whether the road and the limits allow it is for linking and the checks to say, not for the model. It is asked
         # as if nothing were known of the road: where it knows of no lane on the right, it would rather go left.
@@ -124,28 +122,17 @@ class Settled:
 class LanguageModelPlanner:
     """Plans with the on-board language model and the acts of the words, in this process."""
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        constrained: bool = True,
-        history: bool = True,
-        on_text: OnText | None = None,
-    ) -> None:
+    def __init__(self, folder: Path, *, on_text: OnText | None = None) -> None:
         """Load a model.
 
         Args:
             folder: Of the exported model.
-            constrained, history: Whether decoding holds to the grammar, and H is shown; turned off for ablations only.
             on_text: Gets each piece of text as the model writes it.
 
         Raises:
             DataError: The folder holds no model.
-            MissingExtraError: A library is missing.
         """
         self._engine = Engine(folder)
-        self._constrained = constrained
-        self._history = history
         self._on_text = on_text
         self._read: dict[str, tuple[DialectStep, ...]] = {}
 
@@ -156,7 +143,6 @@ class LanguageModelPlanner:
         Raises:
             ConfigError: The argument is no folder.
             DataError: The folder holds no model.
-            MissingExtraError: A library is missing.
         """
         if not argument:
             return cls(SHIPPED, on_text=on_text)
@@ -227,11 +213,9 @@ class LanguageModelPlanner:
         utterance = read(wish)
         before = steps_before(request.history) if shown else ()
         spoken = steps_of(utterance.acts, situation, before)
-        history = history_words(request.history, self._steps_of) if self._history and shown else ()
+        history = history_words(request.history, self._steps_of) if shown else ()
         try:
-            reply, written = answer(
-                self._engine, situation, history, wish, constrained=self._constrained, on_text=self._on_text
-            )
+            reply, written = answer(self._engine, situation, history, wish, on_text=self._on_text)
         except ProgramError as error:
             return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
         same = drive_alike(spoken.steps, reply.steps, wish, request)

@@ -123,7 +123,7 @@ class Options:
     @property
     def last_lane(self) -> int:
         """Index of the rightmost lane that is no emergency lane."""
-        return self.situation.lane_count - (2 if self.situation.emergency_lane else 1)
+        return last_lane(self.situation)
 
     @property
     def least_gap_m(self) -> float:
@@ -172,6 +172,11 @@ _MOST_OVER_SIGN = 1.25
 """Times the sign: a number that is more than that in a unit was said in another one."""
 _READING_ERROR_MPS = 2.0
 """Excess over the sign that limits tolerate without meaning it as leave to speed."""
+
+
+def last_lane(situation: Situation) -> int:
+    """Index of the rightmost lane that is driven in."""
+    return situation.lane_count - (2 if situation.emergency_lane else 1)
 
 
 def speed_words(speed_mps: float) -> str:

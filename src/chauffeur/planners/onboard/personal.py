@@ -59,7 +59,7 @@ def leaning_of(history: History, intent: str, corrections: tuple[Feedback, ...] 
     leaning = Leaning()
     if items:
         last = items[-1]
-        leaning = _moved(_driven_with(last), last.feedback[-1:], _because(last))
+        leaning = _moved(_driven_with(last), last.feedback[-1:], because(last))
     return _moved(leaning, corrections, "I corrected it after what you just said.")
 
 
@@ -72,13 +72,13 @@ def _driven_with(item: HistoryItem) -> Leaning:
     return Leaning(settings.get(SPEED_SETTING, 0.0), settings.get(HEADWAY_SETTING, 0.0))
 
 
-def _moved(leaning: Leaning, feedback: tuple[Feedback, ...], because: str) -> Leaning:
+def _moved(leaning: Leaning, feedback: tuple[Feedback, ...], why: str) -> Leaning:
     for said in feedback:
         speed = leaning.speed_mps + said.speed * said.strength * _SPEED_STEP_MPS
         # feedback says how the gap was: too small (-1) asks for more
         headway = leaning.headway_s - said.gap * said.strength * _HEADWAY_STEP_S
         changed = bool(said.speed or said.gap or said.comfort < 0) and said.strength > 0
-        kept = because if changed or leaning.speed_mps or leaning.headway_s else leaning.because
+        kept = why if changed or leaning.speed_mps or leaning.headway_s else leaning.because
         leaning = Leaning(
             max(-_MAX_SPEED_MPS, min(_MAX_SPEED_MPS, speed)),
             max(-_MAX_HEADWAY_S, min(_MAX_HEADWAY_S, headway)),
@@ -88,10 +88,11 @@ def _moved(leaning: Leaning, feedback: tuple[Feedback, ...], because: str) -> Le
     return leaning
 
 
-def _because(item: HistoryItem) -> str:
-    said = item.feedback[-1].text.strip()
+def because(item: HistoryItem) -> str:
+    """Why a remembered trip counts, a full sentence."""
+    said = " ".join(item.feedback[-1].text.split())[:80] if item.feedback else ""
     day = f" on {item.when[:10]}" if item.when else ""
-    words = f', you said "{said[:80]}"' if said else ""
+    words = f', you said "{said}"' if said else ""
     return f'After "{item.instruction[:80]}"{day}{words}; I keep to that.'
 
 

@@ -43,20 +43,13 @@ def read_reply(text: str) -> OnboardReply:
     return OnboardReply(steps=read(source), source=source)
 
 
-def grammar(
-    questions: tuple[str, ...],
-    refusals: tuple[str, ...],
-    *,
-    only_program: bool = False,
-    measures: tuple[str, ...] = (),
-) -> str:
+def grammar(questions: tuple[str, ...], refusals: tuple[str, ...], *, only_program: bool = False) -> str:
     """The replies up to the end of the program, as a Lark grammar.
 
     Args:
         questions: Everything the model may ask back.
         refusals: Every reason it may give.
         only_program: Whether neither may come.
-        measures: The only numbers that may stand for a speed, a distance or a time; empty for any.
     """
     return "\n".join(
         (
@@ -74,7 +67,6 @@ def grammar(
             *(f"{kind}: {_number(kind)}" for kind in _KINDS),
             'factored: NUMBER " * "',
             r"NUMBER: /[0-9]{1,4}(\.[0-9]{1,2})?/",
-            f"measure: {_any(measures) if measures else 'NUMBER'}",
         )
     )
 
@@ -106,6 +98,5 @@ def _test(name: str) -> str:
 
 def _number(kind: Kind) -> str:
     units = [unit for unit, (what, _, _) in UNITS.items() if what == kind]
-    number = "measure" if kind in ("speed", "distance", "time") else "NUMBER"
-    ways = [number, *(f'{_literal(unit + "(")} {number} ")"' for unit in units)]
+    ways = ["NUMBER", *(f'{_literal(unit + "(")} NUMBER ")"' for unit in units)]
     return f"factored? ({' | '.join(ways)})"

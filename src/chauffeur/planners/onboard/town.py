@@ -67,9 +67,9 @@ _HELP: Final = "I cannot call anybody. Shall I stop at the next safe place?"
 
 
 @cache
-def snippets(folder: Path = SNIPPETS) -> PolicyRepository:
+def snippets() -> PolicyRepository:
     """The learned programs. Raises DataError where they are missing."""
-    return PolicyRepository(folder)
+    return PolicyRepository(SNIPPETS)
 
 
 def town_destination(wish: str, meant: TownIntent | None = None) -> str:
@@ -127,14 +127,8 @@ def asked_plainly(request: PlanRequest, plan: Plan) -> PlanRequest | None:
     return replace(request, instruction=said)
 
 
-def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepository | None = None) -> Plan | None:
-    """The plan for an instruction in a town; None where it is none of the kinds that were learned.
-
-    Args:
-        planner: Whose plan it is.
-        request: What is asked.
-        repository: Learned programs; those that ship with the package by default.
-    """
+def plan_in_town(planner: Planner, request: PlanRequest) -> Plan | None:
+    """The plan for an instruction in a town; None where it is none of the kinds that were learned."""
     begun = time.perf_counter()
     if vocabulary_of(request.context.situation.world) != "town":
         return None
@@ -152,7 +146,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
         return None  # a way of driving: no way to go
     if speaks_to_somebody(said) and not meant.surely("stop"):
         return _stop_asked(planner, begun)
-    steps = steps_of(request.instruction.text, repository or snippets(), meant)
+    steps = steps_of(request.instruction.text, snippets(), meant)
     if not steps:
         if meant.likely and meant.kind == "goto":
             return declined(planner, _WHERE, begun, intent="ask")
@@ -174,7 +168,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
         Program(program_of(steps, said_again=request.instruction.source == "benchmark")),
         begun,
         intent="+".join(_intent(step) for step in steps),
-        model=f"{planner.model}+snippets-{(repository or snippets()).digest[:8]}",
+        model=f"{planner.model}+snippets-{snippets().digest[:8]}",
         raw="; ".join(f"{one.entry.callable_name} ({one.similarity:.2f}): {one.entry.command}" for one in near),
     )
     plan = undenied(planner, plan, request, begun)

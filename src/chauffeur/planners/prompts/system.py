@@ -67,7 +67,6 @@ def build_system_message(
     *,
     limits: Limits | None = None,
     chain_of_thought: bool = False,
-    api_docs: str | None = None,
     vocabulary: Vocabulary = "road",
 ) -> SystemMessage:
     """S for planners that write programs.
@@ -76,20 +75,17 @@ def build_system_message(
         setting: `zero-shot` gives the documentation only, `few-shot` adds three worked examples.
         limits: Bounds the program is held to; the model is told of them. Default: `Limits()`.
         chain_of_thought: Ask for numbered reasoning (situation, wish, risks, plan) before the program.
-        api_docs: Driving-API documentation; default is the catalogue that also gates and runs programs.
         vocabulary: Which of the driving APIs there are where the programs are to drive.
     """
-    if api_docs is None:
-        from chauffeur.programs.catalogue import render_docs
+    from chauffeur.programs.catalogue import render_docs  # heavy with its package; prompts are imported early
 
-        api_docs = render_docs(vocabulary)
     bounds = limits or Limits()
     text = fill(
         template("rules_town.md" if vocabulary == "town" else "rules.md"),
         {
             "limits": describe_limits(bounds),
             "answer": template("answer_steps.md" if chain_of_thought else "answer_plain.md"),
-            "api": api_docs.strip(),
+            "api": render_docs(vocabulary).strip(),
         },
     )
     if setting == "few-shot":

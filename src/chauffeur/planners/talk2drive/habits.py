@@ -15,6 +15,7 @@ from typing import Any, Final, Literal
 from chauffeur.concept import Feedback, History, HistoryItem
 from chauffeur.memory.feedback import PLAIN
 from chauffeur.memory.remarks import sort_remark
+from chauffeur.planners.onboard.personal import because
 
 SIGN_SETTING: Final = "speed_limit_mps"
 """Among a plan's settings: the limit where it was driven, so that speeds carry over to other roads."""
@@ -136,11 +137,11 @@ def _meant(item: HistoryItem) -> Meant | None:
         remark = sort_remark(item.feedback[-1].text)
         wanted = WANTED.get(remark.kind, "") if remark.share >= _SURE else ""
         if wanted:
-            return Meant(wanted, True, item.similarity, _because(item))
+            return Meant(wanted, True, item.similarity, because(item))
     done = kind_of(item.intent, str(_policy(item).get("route", "")))
     if item.feedback and _taken_wrongly(done, item.feedback[-1]):
         done = "faster" if done == "slower" else "slower"
-    return Meant(done, False, item.similarity, _because(item)) if done else None
+    return Meant(done, False, item.similarity, because(item)) if done else None
 
 
 def _taken_wrongly(done: str, said: Feedback) -> bool:
@@ -174,9 +175,9 @@ def pace_of(history: History, world: str, intent: str, chosen_share: float) -> P
         same = of == group and (group != "plain" or _family(item.intent) == _family(intent))
         step = _STEP * said.strength**_CURVE
         if said.speed > 0 and (same or _RANK[of] < _RANK[group]) and pace.share < driven * (1.0 + step):
-            pace, known = Pace(driven * (1.0 + step), _because(item), 1), True
+            pace, known = Pace(driven * (1.0 + step), because(item), 1), True
         elif said.speed < 0 and (same or _RANK[of] > _RANK[group]) and pace.share > driven * (1.0 - step):
-            pace, known = Pace(driven * (1.0 - step), _because(item), -1), True
+            pace, known = Pace(driven * (1.0 - step), because(item), -1), True
         elif not said.speed and same and said.approval >= 0:
             pace, known = Pace(driven, ""), True
     return pace if known else None
@@ -215,13 +216,3 @@ def _policy(item: HistoryItem) -> dict[str, Any]:
     except ValueError:
         return {}
     return found if isinstance(found, dict) else {}
-
-
-def _because(item: HistoryItem) -> str:
-    said = " ".join(item.feedback[-1].text.split())[:80] if item.feedback else ""
-    words = f', you said "{said}"' if said else ""
-    return f'After "{item.instruction[:80]}"{_day(item)}{words}; I keep to that.'
-
-
-def _day(item: HistoryItem) -> str:
-    return f" on {item.when[:10]}" if item.when else ""

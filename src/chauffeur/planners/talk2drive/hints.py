@@ -14,9 +14,9 @@ from typing import Final
 
 from chauffeur.concept import History, Situation
 from chauffeur.language.text_classifier import load_sorter
+from chauffeur.planners.onboard.options import last_lane
 from chauffeur.planners.talk2drive.explicit_overtake import told
 from chauffeur.planners.talk2drive.habits import Meant, meant_before
-from chauffeur.planners.talk2drive.lanes import last_lane
 
 WEIGHTS: Final = Path(__file__).parent / "weights" / "wishes.npz"
 

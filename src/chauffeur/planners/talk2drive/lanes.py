@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final, Literal
 
 from chauffeur.concept import Limits, Situation
+from chauffeur.planners.onboard.options import last_lane
 from chauffeur.planners.talk2drive.style import BRISK_SHARE, CALM_SHARE, LOT_SHARE, RIGHT_SHARE
 
 _HURRIES: Final = ("style.hurry", "style.sporty")
@@ -38,11 +39,6 @@ def mood_lane(intent: str, situation: Situation) -> Literal[-1, 0, 1]:
     if intent.startswith(_EASES) and situation.lane_index < last_lane(situation):
         return 1
     return 0
-
-
-def last_lane(situation: Situation) -> int:
-    """The rightmost lane that is driven in."""
-    return situation.lane_count - (2 if situation.emergency_lane else 1)
 
 
 def follows(situation: Situation) -> bool:

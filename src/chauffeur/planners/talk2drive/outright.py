@@ -5,11 +5,11 @@ Read from the acts of the words (`language.meaning`); whatever only may be meant
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept.utterance import Act, Style, Utterance
+from chauffeur.planners.arbitration import one_sign
 
 SURE: Final = 0.6
 """Of a reading: surer ones are taken at their word. Chosen on the tuning half of the simulated passengers."""
@@ -41,7 +41,7 @@ class Outright:
             return cls()
         acts = [act for act in said.acts if not act.negated and act.when is None]
         sides = frozenset(act.side for act in acts if act.side is not None and act.act in ("lane", "turn"))
-        return cls(sides, _sign(map(_pace, acts)), bool(said.acts), said.address == "question" and not said.acts)
+        return cls(sides, one_sign(map(_pace, acts)), bool(said.acts), said.address == "question" and not said.acts)
 
     def contradicts(self, *, side: str, pace: int) -> bool:
         """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
@@ -51,8 +51,3 @@ class Outright:
 def _pace(act: Act) -> int:
     mood = _MOODS.get(act.style, "") if act.style is not None else ""
     return _PACES.get(mood or (act.direction or "" if act.act == "speed" else ""), 0)
-
-
-def _sign(changes: Iterable[int]) -> Literal[-1, 0, 1]:
-    found = {change for change in changes if change}
-    return 0 if len(found) != 1 else 1 if found.pop() > 0 else -1
