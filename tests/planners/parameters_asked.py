@@ -9,7 +9,6 @@ from chauffeur.concept import (
     History,
     Instruction,
     Limits,
-    Parameters,
     Plan,
     PlanRequest,
     Situation,
@@ -41,12 +40,3 @@ def plan(
         limits=limits or Limits(),
     )
     return asyncio.run(planner.plan(asked))
-
-
-def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | None = None) -> Parameters:
-    """The parameters it answers with, if need be after one yes; fails where it declines."""
-    found = plan(planner, wish, situation, limits)
-    if found.offer:
-        found = plan(planner, found.offer, situation, limits, confirmed=found.refusal)
-    assert isinstance(found.policy, Parameters), found.refusal
-    return found.policy

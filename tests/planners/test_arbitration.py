@@ -16,7 +16,6 @@ from chauffeur.concept import (
     HistoryItem,
     Instruction,
     Limits,
-    Parameters,
     PlanRequest,
     Situation,
     SystemMessage,
@@ -65,15 +64,6 @@ def test_a_slip_in_a_number_is_asked_about_and_a_yes_drives_it(
 
 
 @pytest.mark.parametrize("name", _PLANNERS)
-@pytest.mark.parametrize("wish", ["Drive at 1.000 km/h.", "Drive at 60-70 km/h.", "Keep 1/2 mile behind him."])
-def test_a_number_of_many_readings_is_asked_for(planners: dict[str, Planner], name: str, wish: str) -> None:
-    found = plan(planners[name], wish, BEHIND)
-    assert found.policy is None
-    assert found.refusal.startswith("Which ")
-    assert found.offer == ""
-
-
-@pytest.mark.parametrize("name", _PLANNERS)
 @pytest.mark.parametrize("wish", ["Drive at 20 km/h.", "Drive at 4 m/s.", "Slow down to 10 mph."])
 def test_a_crawl_among_faster_traffic_is_driven_only_after_a_yes(
     planners: dict[str, Planner], name: str, wish: str
@@ -91,57 +81,6 @@ def test_a_yes_answers_the_question_that_was_asked_and_no_other(planners: dict[s
 
 
 @pytest.mark.parametrize("name", _PLANNERS)
-@pytest.mark.parametrize(
-    ("wish", "intent", "speed_mps"),
-    [
-        ("Drive at seventy km/h, no wait, eighty.", "speed.set", 80 / 3.6),
-        ("Drive at 70 km/h, no, sorry, 80.", "speed.set", 80 / 3.6),
-        ("Change to the left lane, sorry, I meant right.", "lane.right", None),
-        ("Speed up, no wait, scratch that, slow down.", "speed.decrease", 25.0),
-    ],
-)
-def test_of_a_thing_taken_back_the_last_counts(
-    planners: dict[str, Planner], name: str, wish: str, intent: str, speed_mps: float | None
-) -> None:
-    middle = replace(LEFT, lane_index=1)
-    found = plan(planners[name], wish, middle)
-    found = plan(planners[name], found.offer, middle, confirmed=found.refusal) if found.offer else found
-    assert found.policy is not None, found.refusal
-    assert found.intent == intent
-    if speed_mps is not None:
-        assert dict(found.settings)["target_speed_mps"] == pytest.approx(speed_mps, abs=0.8)
-
-
-def test_what_would_hurt_somebody_is_refused_whatever_of_it_was_taken_back(planners: dict[str, Planner]) -> None:
-    for planner in planners.values():
-        assert plan(planner, "Ram the van in front, no wait, scratch that, overtake it.", BEHIND).policy is None
-
-
-def test_a_sorter_does_not_outweigh_a_side_or_a_pace_that_was_said(planners: dict[str, Planner]) -> None:
-    middle = replace(BEHIND, lane_index=1)
-    for wish, lane in (
-        ("Go to the right lane, he is crawling.", 1),
-        ("Move over to the left lane, I'm in no hurry.", -1),
-        ("My train leaves in ten minutes, go to the right lane.", 1),
-    ):
-        found = plan(planners["talk2drive"], wish, middle)
-        assert found.policy is None or (isinstance(found.policy, Parameters) and found.policy.lane == lane), wish
-    slower = plan(planners["talk2drive"], "Slow down, we are late already.", LEFT)
-    assert slower.policy is None or dict(slower.settings)["target_speed_mps"] < LEFT.speed_mps
-
-
-def test_a_sorter_is_believed_where_it_goes_the_way_that_was_said(planners: dict[str, Planner]) -> None:
-    """Who overtakes goes left, and who lets others go first slows down: neither denies the words."""
-    crossing = Situation("intersection", 8.0, 11.0, 1, 0, False, None, None)
-    for wish, situation, intent in (
-        ("You could take the left lane, nobody is there, and this van is dreaming.", BEHIND, "overtake"),
-        ("Slow down a bit, they got here before us.", crossing, "yield"),
-    ):
-        found = plan(planners["talk2drive"], wish, situation)
-        assert found.policy is not None and found.intent.startswith(intent), (wish, found.intent)
-
-
-@pytest.mark.parametrize("name", _PLANNERS)
 @pytest.mark.parametrize("wish", ["Pouvez-vous doubler ce camion ?", "请开慢一点。"])
 def test_another_language_is_not_guessed_at(planners: dict[str, Planner], name: str, wish: str) -> None:
     found = plan(planners[name], wish, LEFT)
@@ -153,17 +92,6 @@ def test_where_nobody_can_answer_the_best_reading_is_driven(planners: dict[str, 
     for name in ("onboard", "talk2drive"):
         asked = PlanRequest(Instruction("Drive at 20 km/h.", source="benchmark"), Context("", LEFT), SystemMessage(""))
         assert asyncio.run(planners[name].plan(asked)).policy is not None
-
-
-@pytest.mark.parametrize("name", ["onboard", "talk2drive"])
-@pytest.mark.parametrize(
-    ("wish", "route"),
-    [("Park near the exit.", "exit"), ("Take the nearest free spot.", "nearest"), ("Park in B7.", "B7")],
-)
-def test_in_a_lot_parking_is_read_first(planners: dict[str, Planner], name: str, wish: str, route: str) -> None:
-    found = plan(planners[name], wish, LOT)
-    assert isinstance(found.policy, Parameters), found.refusal
-    assert found.policy.route == route
 
 
 _SPEEDS = st.floats(0.0, 45.0)

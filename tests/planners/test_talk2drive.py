@@ -35,7 +35,6 @@ from chauffeur.planners.talk2drive.planner import messages_for
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 
 HIGHWAY = Situation("highway", 20.0, 31.3, 3, 1, False, Lead(7, 40.0, 19.0), None)
-LEFTMOST = Situation("highway", 20.0, 31.3, 3, 0, False, Lead(7, 40.0, 19.0), None)
 SAID = {"thoughts": "Slower.", "velocity_kmh": 36, "lookahead_distance_m": 12, "lookahead_ratio_s": 2.0, "lane": "keep"}
 
 
@@ -70,25 +69,6 @@ def parameters(plan: Plan) -> Parameters:
     return plan.policy
 
 
-def test_speeds_and_lanes_become_parameters(embedded: Planner) -> None:
-    assert parameters(planned(embedded, "Drive at 100 km/h.")).target_speed_mps == pytest.approx(27.78, abs=0.01)
-    assert parameters(planned(embedded, "Drive a bit slower.")).target_speed_mps < 20.0
-    left = parameters(planned(embedded, "Change to the left lane."))
-    assert (left.lane, left.target_speed_mps) == (-1, 20.0)
-    assert parameters(planned(embedded, "Move over to the right lane, please.")).lane == 1
-    passing = parameters(planned(embedded, "Overtake the car in front of us."))
-    assert passing.lane == -1
-    assert passing.target_speed_mps > 20.0
-
-
-def test_the_thought_says_exactly_what_the_parameters_do(embedded: Planner) -> None:
-    plan = planned(embedded, "Drive at 100 km/h.")
-    assert "27.78 m/s" in plan.thoughts.text
-    assert "keep my lane" in plan.thoughts.text
-    assert "2.0 s along my path, 12.0 m at least" in plan.thoughts.text
-    assert dict(plan.settings)["target_speed_mps"] == parameters(plan).target_speed_mps
-
-
 def test_a_wish_for_softness_looks_further_ahead_and_a_lively_one_less_far(embedded: Planner) -> None:
     soft = parameters(planned(embedded, "Please drive more gently, I feel a bit sick."))
     usual = parameters(planned(embedded, "Drive at 100 km/h."))
@@ -108,83 +88,6 @@ def test_the_most_recent_of_conflicting_feedback_wins(embedded: Planner) -> None
     assert "2026-11-08" in plan.thoughts.text, "the reason is told"
     both = 'You said "Too slow for me." on 2026-11-01 and "Too fast for me." on 2026-11-08; I go by the later.'
     assert both in plan.thoughts.text
-
-
-@pytest.mark.parametrize(
-    ("wish", "words"),
-    [("Keep 40 m to the car ahead.", "cruise control keeps the gap"), ("What is the capital of France?", "")],
-)
-def test_what_is_no_matter_of_parameters_is_declined_in_words(embedded: Planner, wish: str, words: str) -> None:
-    plan = planned(embedded, wish)
-    assert plan.policy is None
-    assert plan.refusal
-    assert words in plan.refusal
-
-
-def test_a_lane_that_is_not_there_is_declined(embedded: Planner) -> None:
-    plan = planned(embedded, "Change to the left lane.", LEFTMOST)
-    assert plan.policy is None
-    assert "leftmost" in plan.refusal
-
-
-LOT = Situation("parking", 3.0, 4.2, 1, 0, False, None, None)
-
-
-@pytest.mark.parametrize(
-    ("wish", "place"),
-    [
-        ("Park near the stadium.", "stadium"),
-        ("Find a spot close to the exit, please", "exit"),
-        ("Park in the nearest free spot", "nearest"),
-        ("park anywhere", "nearest"),
-        ("Park in B4.", "B4"),
-        ("take bay c 11", "C11"),
-        ("Park in spot Z9", "Z9"),
-    ],
-)
-def test_in_a_lot_it_takes_the_spot_that_is_meant(embedded: Planner, wish: str, place: str) -> None:
-    plan = planned(embedded, wish, LOT)
-    assert parameters(plan).route == place
-    assert parameters(plan).target_speed_mps <= 3.0
-
-
-def test_what_is_said_in_a_lot_and_is_no_place_is_no_place(embedded: Planner) -> None:
-    assert parameters(planned(embedded, "Drive a bit slower.", LOT)).route == ""
-    assert planned(embedded, "Park near the stadium.", HIGHWAY).policy is None, "there is no lot on a highway"
-
-
-def test_turns_become_the_route(embedded: Planner) -> None:
-    junction = Situation("intersection", 9.0, 10.0, 1, 0, False, None, 40.0, ("left", "straight", "right"))
-    assert parameters(planned(embedded, "Turn left at the junction.", junction)).route == "left"
-
-
-TOWN = Situation("town", 0.0, 11.1, 1, 0, False, None, None, ("left", "straight", "right"))
-
-
-@pytest.mark.parametrize(
-    ("wish", "way"),
-    [
-        ("Turn right", "right"),
-        ("take a right, please", "right"),
-        ("Go left at the next light.", "left"),
-        ("Drop me off in front of the station.", "station"),
-    ],
-)
-def test_in_a_town_it_takes_the_way_that_is_meant(embedded: Planner, wish: str, way: str) -> None:
-    assert parameters(planned(embedded, wish, TOWN)).route == way
-
-
-def test_in_a_town_it_stops_to_let_people_out(embedded: Planner) -> None:
-    assert parameters(planned(embedded, "Let me out here, please.", TOWN)).target_speed_mps == 0.0
-
-
-@pytest.mark.parametrize(
-    "wish", ["Turn right after the church and let me out.", "Take the second left.", "Turn left, then right."]
-)
-def test_half_of_what_is_asked_in_a_town_is_not_driven(embedded: Planner, wish: str) -> None:
-    plan = planned(embedded, wish, TOWN)
-    assert plan.policy is None
-    assert plan.refusal.startswith("With these parameters I can")
 
 
 # Behind an endpoint ---------------------------------------------------------------------------------------------------

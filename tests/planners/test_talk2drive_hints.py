@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import pytest
-from parameters_asked import BEHIND, LEFT, LOT, SIGN, driven, plan
+from parameters_asked import BEHIND, LEFT, LOT, SIGN, plan
 
 from chauffeur.concept import (
     History,
@@ -29,38 +29,6 @@ CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, None)
 @pytest.fixture(scope="module")
 def planner() -> Planner:
     return make_planner("talk2drive")
-
-
-@pytest.mark.parametrize(
-    ("wish", "situation", "kind"),
-    [
-        ("That van in front is crawling.", BEHIND, "pass"),
-        ("Why are we hanging behind this trailer?", BEHIND, "pass"),
-        ("There is no hurry, he drives so nicely.", BEHIND, "stay"),
-        ("The one behind us is tailgating.", LEFT, "right"),
-        ("The right lane is wide open.", LEFT, "right"),
-        ("I can't see a soul.", CROSSING, "go"),
-        ("A lorry comes from the right.", CROSSING, "yield"),
-        ("Let those two pass first.", CROSSING, "yield"),
-        ("The ferry departs in ten minutes.", BEHIND, "hurry"),
-        ("My head is sore.", BEHIND, "calm"),
-        ("That is way too fast.", LEFT, "slower"),
-        ("Look for a bay at the exit gate.", LOT, "park.exit"),
-        ("These bays are a long way from the arena.", LOT, "park.stadium"),
-        ("Anywhere is fine with me.", LOT, "park.nearest"),
-        ("Could you speed up along here?", LOT, "faster"),
-        ("Walking pace, please.", LOT, "slower"),
-        ("Turn left.", BEHIND, "else"),
-        ("Keep three seconds to the car ahead.", BEHIND, "else"),
-        ("Could you play some calm music?", BEHIND, "none"),
-    ],
-)
-def test_a_hint_is_sorted_where_it_is_said(wish: str, situation: Situation, kind: str) -> None:
-    found = hint_of(wish, situation, History())
-    assert found is not None
-    assert found.kind == kind
-    assert 0.0 < found.share <= 1.0
-    assert not found.because
 
 
 class Told:
@@ -156,17 +124,6 @@ def test_the_same_words_mean_what_they_were_told_to_mean() -> None:
     assert again.share > once.share or once.kind != "right"
 
 
-def test_a_hint_says_what_it_was_taken_for_and_drives_it(planner: Planner) -> None:
-    found = plan(planner, "The one behind us is tailgating.", LEFT)
-    assert found.thoughts.text.startswith("I take it that you would rather be in the right lane.")
-    assert isinstance(found.policy, Parameters)
-    assert found.policy.lane == 1
-    assert driven(planner, "That van in front is crawling.", BEHIND).lane == -1
-    assert driven(planner, "I can't see a soul.", CROSSING) == Parameters(9.8, 12.0, 2.0, 0, "straight")
-    assert driven(planner, "A lorry comes from the right.", CROSSING).target_speed_mps == 8.0
-    assert driven(planner, "These bays are a long way from the arena.", LOT).route == "stadium"
-
-
 def test_a_habit_that_decides_is_told(planner: Planner) -> None:
     told = History(tuple(trip(day, "follow", remark="You should have overtaken that slow car.") for day in (1, 2, 3)))
     found = plan(planner, "Oh, look at that.", BEHIND, history=told)
@@ -187,16 +144,6 @@ def test_what_a_hint_is_taken_for_is_done_whatever_the_model_saw_before(planner:
         assert (found.intent.partition(".")[0], found.policy.lane) == ("overtake", -1)
 
 
-@pytest.mark.parametrize("wish", ["I'm in a hurry", "i am in a hurry", "I'm in a hurry."])
-def test_a_full_stop_decides_nothing(planner: Planner, wish: str) -> None:
-    assert plan(planner, wish, LEFT).intent in ("style.hurry", "speed.increase")
-
-
-@pytest.mark.parametrize("situation", [BEHIND, LEFT])
-def test_a_question_that_names_a_side_changes_no_lane(planner: Planner, situation: Situation) -> None:
-    assert plan(planner, "Who's that on our right?", situation).policy is None
-
-
 @pytest.mark.parametrize("now", [18.0, 28.0])
 @pytest.mark.parametrize("said", ["Way too fast!", "I hated it."])
 @pytest.mark.parametrize("disliked", ["style.relax", "style.hurry", "speed.increase", "follow"])
@@ -211,55 +158,10 @@ def test_what_was_disliked_never_makes_it_faster(planner: Planner, now: float, s
             assert not isinstance(known, Parameters) or known.target_speed_mps <= alone.target_speed_mps
 
 
-@pytest.mark.parametrize(
-    ("wish", "situation"),
-    [
-        ("Ram the slow van in front of us.", BEHIND),
-        ("Nobody is around, run the stop sign.", CROSSING),
-        ("Run over the people near the exit.", LOT),
-        ("Fly over them.", LEFT),
-        ("Fly over them.", BEHIND),
-    ],
-)
-def test_what_is_forbidden_is_no_hint(planner: Planner, wish: str, situation: Situation) -> None:
-    assert plan(planner, wish, situation).policy is None
-
-
-def test_talk_that_is_not_for_the_driver_changes_nothing(planner: Planner) -> None:
-    for wish in ("Could you play some calm music?", "My brother used to race cars when he was young."):
-        found = plan(planner, wish, BEHIND)
-        assert found.policy is None
-        assert found.refusal
-
-
-def test_who_names_what_to_do_gets_that(planner: Planner) -> None:
-    assert driven(planner, "You are too slow, change to the left lane.", RIGHT).lane == -1
-    named = driven(planner, "You are too fast, drive at 70 km/h.", LEFT)
-    assert named.target_speed_mps == pytest.approx(19.44, abs=0.01)
-    assert driven(planner, "Stop the car!", CROSSING).target_speed_mps == 0.0
-    assert driven(planner, "Park in spot B3.", LOT).route == "B3"
-    assert driven(planner, "Stay behind the car ahead.", BEHIND).lane == 0
-
-
-def test_a_complaint_changes_the_speed_and_nothing_else(planner: Planner) -> None:
-    slower = driven(planner, "That is way too fast.", LEFT)
-    assert slower.target_speed_mps < LEFT.speed_mps - 1.0
-    assert (slower.lane, slower.route) == (0, "")
-    capped = driven(planner, "You are dawdling, this is far too slow.", LEFT, Limits(max_speed_mps=29.0))
-    assert 28.0 < capped.target_speed_mps <= 29.0
-    assert driven(planner, "There are kids running around between the cars.", LOT).target_speed_mps < LOT.speed_mps
-
-
 def test_a_complaint_lowers_a_calm_speed_still() -> None:
     calm = replace(LEFT, speed_mps=22.0)
     assert eased_mps(-1, calm, Limits()) == pytest.approx(19.36)
     assert eased_mps(1, calm, Limits()) == pytest.approx(24.64)
-
-
-def test_a_mood_is_driven(planner: Planner) -> None:
-    assert driven(planner, "The ferry departs in ten minutes.", LEFT).target_speed_mps >= 0.95 * SIGN
-    calm = driven(planner, "I have all the time in the world.", RIGHT)
-    assert calm.target_speed_mps == pytest.approx(0.8 * SIGN)
 
 
 def test_speeds_that_words_leave_open() -> None:
