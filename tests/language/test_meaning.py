@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import onnxruntime
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import DataError
@@ -174,6 +174,7 @@ def test_emergency_words_are_marked_by_their_own_reader() -> None:
     assert not read("Don't stop behind the bus, change to the left lane.").emergency
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.text(max_size=MOST_CHARS + 50))
 def test_no_text_makes_it_raise(text: str) -> None:
     utterance = read(text[:300])

@@ -18,6 +18,7 @@ from chauffeur.language.slips import slip_in
 from chauffeur.language.text_classifier import load_sorter
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import SAID_WEATHERS, WEIGHTS, said_weather
+from chauffeur.planners.arbitration import denied_intent
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.talk2drive.explicit_overtake import told
 from chauffeur.planners.talk2drive.style import destination_of
@@ -49,6 +50,7 @@ READERS: dict[str, Callable[[str], str]] = {
     "alarm told": lambda text: "alarm" if tells_of_alarm(text) else "none",
     "corrected": lambda text: "=" if last_said(text) == text else last_said(text),
     "danger": danger_of,
+    "denied": lambda text: "denied" if denied_intent(*text.rpartition(" | ")[::2]) else "wanted",
     "destination": lambda text: destination_of(text) or "none",
     "emergency": lambda text: "none" if (found := read_emergency(text)) is None else found.kind,
     "form": form_of,

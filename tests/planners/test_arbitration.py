@@ -21,7 +21,7 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.planners.arbitration import PACES, denied_intent, slow_speed_words, within_mood
+from chauffeur.planners.arbitration import PACES, slow_speed_words, within_mood
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.choose_speed import choose_style
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY
@@ -163,41 +163,6 @@ def test_within_a_mood(speed: float, now: float, most: float) -> None:
     assert within_mood(speed, -1, now, most) <= now
     assert within_mood(speed, 1, now, most) >= min(now, most)
     assert within_mood(speed, 0, now, most) == speed
-
-
-@pytest.mark.parametrize(
-    ("words", "intent"),
-    [
-        ("don't turn left", "turn.left"),
-        ("Not straight on!", "turn.straight"),
-        ("anything but right", "turn.right"),
-        ("please don't slow down now", "speed.decrease"),
-        ("do everything except overtake", "overtake.left"),
-        ("no, do not pull over", "pull_over"),
-        ("Faster, but no lane to the left!", "speed.increase+lane.left"),
-    ],
-)
-def test_what_words_deny_is_not_driven(words: str, intent: str) -> None:
-    assert denied_intent(words, intent) is not None
-
-
-@pytest.mark.parametrize(
-    ("words", "intent"),
-    [
-        ("not so fast", "speed.decrease"),
-        ("not the left one, the right lane", "lane.right"),
-        ("don't turn left", "turn.straight"),
-        ("not left here, left at the next one", "turn.left"),
-        ("no rush", "style.relax"),
-        ("don't overtake him", "follow"),
-        ("slow down, no stopping", "speed.decrease"),
-        ("I wouldn't mind a slower ride", "speed.decrease"),
-        ("Can't you go faster?", "speed.increase"),
-        ("Why don't we overtake him?", "overtake.left"),
-    ],
-)
-def test_what_words_ask_for_beside_a_denial_is_driven(words: str, intent: str) -> None:
-    assert denied_intent(words, intent) is None
 
 
 @pytest.mark.parametrize("name", _PLANNERS)

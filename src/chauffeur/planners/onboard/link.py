@@ -14,6 +14,7 @@ from chauffeur.concept import Limits, Situation
 from chauffeur.planners.onboard.choose import Choice, choose
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, DialectStep
 from chauffeur.planners.onboard.exemplars import function_of
+from chauffeur.planners.onboard.exemplars.texts import sections
 from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
@@ -26,30 +27,8 @@ _WAIT = f"""def wait(seconds):
         yield autopilot()
 """
 
-_TESTS = {
-    "lead_slower_than": """def lead_slower_than(speed):
-    front = detect_front_vehicle_in(get_lane_of(get_ego_vehicle()))
-    return front is not None and get_speed_of(front) < speed
-""",
-    "lead_closer_than": """def lead_closer_than(distance):
-    ego = get_ego_vehicle()
-    front = detect_front_vehicle_in(get_lane_of(ego))
-    return front is not None and get_distance_between_vehicles(front, ego) < distance
-""",
-    "lead_further_than": """def lead_further_than(distance):
-    ego = get_ego_vehicle()
-    front = detect_front_vehicle_in(get_lane_of(ego))
-    return front is None or get_distance_between_vehicles(front, ego) > distance
-""",
-    "clear_left": """def clear_left():
-    lane = get_left_lane(get_ego_vehicle())
-    return lane is not None and is_safe_enter(lane, 2.0)
-""",
-    "clear_right": """def clear_right():
-    lane = get_right_lane(get_ego_vehicle())
-    return lane is not None and is_safe_enter(lane, 2.0)
-""",
-}
+_TESTS = {name: f"{text.rstrip()}\n" for name, text in sections("chauffeur.planners.onboard", "conditions").items()}
+"""The functions of conditions, by name."""
 assert _TESTS.keys() == CONDITIONS.keys()
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from chauffeur.planners.onboard.exemplars.texts import sections
 from chauffeur.planners.onboard.town_steps import LANE_CHANGES, WORDS, TownStep
 
 _STOPS_BEFORE_M: Final = 12.0
@@ -79,12 +80,14 @@ def program_of(steps: Sequence[TownStep], *, said_again: bool = False) -> str:
             lane = next((name for name in LANE_CHANGES if name in step.calls), "")
             body += [f"    {lane}()"] if lane else []
             body += ["    for _ in range(100):", "        yield proceed(check_speed_limit())"]
-    helpers = [
-        *([_CROSSING] if any(step.turn for step in steps) else []),
-        *([_PASSING] if any(step.nth > 1 for step in steps) else []),
-        *([_FAR] if any(step.after_m is not None for step in steps) else []),
-    ]
-    return "\n".join(["".join(helpers), "def as_told():", *body, ""]).lstrip("\n")
+    used = {
+        "cross_the_junction": any(step.turn for step in steps),
+        "pass_a_way": any(step.nth > 1 for step in steps),
+        "drive_on": any(step.after_m is not None for step in steps),
+    }
+    texts = sections("chauffeur.planners.onboard", "town")
+    helpers = "".join(f"{texts[name].rstrip()}\n\n\n" for name, needed in used.items() if needed)
+    return "\n".join([helpers, "def as_told():", *body, ""]).lstrip("\n")
 
 
 def _driven_until(condition: str) -> list[str]:
@@ -95,43 +98,3 @@ def _driven_until(condition: str) -> list[str]:
         "            break",
         "        yield proceed(check_speed_limit())",
     ]
-
-
-_CROSSING: Final = """def cross_the_junction():
-    last = get_distance_to_junction()
-    for _ in range(12000):
-        now = get_distance_to_junction()
-        if now > last + 10:
-            break
-        last = now
-        yield proceed(check_speed_limit())
-    gone = 0.0
-    for _ in range(12000):
-        gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
-        if gone > 40.0:
-            break
-        yield proceed(check_speed_limit())
-
-
-"""
-_PASSING: Final = """def pass_a_way(side):
-    counted = can_go(side)
-    yield from cross_the_junction()
-    for _ in range(8):
-        if counted:
-            break
-        counted = can_go(side)
-        yield from cross_the_junction()
-
-
-"""
-_FAR: Final = """def drive_on(far):
-    gone = 0.0
-    for _ in range(12000):
-        gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
-        if gone > far:
-            break
-        yield proceed(check_speed_limit())
-
-
-"""

@@ -25,7 +25,8 @@ def read_texts(package: str, files: tuple[str, ...], helpers: str) -> Mapping[st
     return texts
 
 
-def sections(package: str, file: str) -> dict[str, str]:
+@cache
+def sections(package: str, file: str) -> Mapping[str, str]:
     """The texts of an `.lmp` file by name, in its order."""
     text = resources.files(package).joinpath(f"{file}.lmp").read_text(encoding="utf-8")
     parts = re.split(r"^### (.+)\n", text, flags=re.MULTILINE)[1:]
