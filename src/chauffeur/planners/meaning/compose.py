@@ -10,8 +10,8 @@ from typing import Final
 from chauffeur.concept import Limits, Observation, Situation, VehicleState
 from chauffeur.concept.sight import AT_KERB_M, states_of
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH
-from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, ReferenceKind, Side, Utterance, Verb
-from chauffeur.language.ground import PLURALS, Grounded, Target, ground, spoken_of
+from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, Side, Utterance, Verb
+from chauffeur.language.ground import PLURALS, ROAD_USERS, Grounded, Target, ground, spoken_of
 from chauffeur.language.meaning.words import act_words, reference_words
 from chauffeur.planners.meaning.helpers import helpers_used
 
@@ -41,12 +41,6 @@ _TAGS: Final[dict[Verb, str]] = {"straight": "turn.straight", "goto": "go_to", "
 _MOVES_ON: Final[frozenset[Verb]] = frozenset({"turn", "straight", "go", "lane", "follow"})
 """Acts after which other things come into sight."""
 _STANDS: Final[frozenset[Verb]] = frozenset({"stop", "park", "pull_over"})
-_ROAD_USERS: Final[frozenset[ReferenceKind]] = frozenset(
-    {
-        "car", "truck", "bus", "van", "motorcycle", "bicycle", "pedestrian", "vehicle", "vehicles", "pedestrians",
-        "traffic", "obstacle", "cone", "barrier",
-    }
-)  # fmt: skip
 _CANNOT: Final[dict[Verb, str]] = {
     "u_turn": "I do not turn round on the street",
     "enter": "I do not drive off the street",
@@ -287,7 +281,7 @@ class _Composer:
                 yield f"yield from halt({2 * _STOOD_STEPS})"
             else:
                 yield f"yield from stand_before_junction({self._pace:g})"
-        elif reference.kind in _ROAD_USERS:
+        elif reference.kind in ROAD_USERS:
             for lines, name in self._user(reference, act):
                 yield from lines
                 yield f"yield from stand_{self._stand(relation, reference)}({name})"
@@ -333,7 +327,7 @@ class _Composer:
             passed_up = any(one.act == "turn" and one.negated for one in self._acts)
             if nth == 1 and passed_up and act.place is not None and act.place.rel == "next":
                 nth = 2  # "not this right, the next one"
-        elif reference is not None and reference.kind in _ROAD_USERS and act.place is not None:
+        elif reference is not None and reference.kind in ROAD_USERS and act.place is not None:
             yield from self._past(act.place, reference, act)
         turns = self._situation.turns
         ends = reference is not None and reference.kind == "end_of_road"
@@ -365,7 +359,7 @@ class _Composer:
             yield "        break"
             yield f"    yield proceed(min(check_speed_limit(), {self._pace:g}))"
         yield f"{'go_straight' if side == 'straight' else f'turn_{side}'}_at_next_intersection()"
-        looks = self._next is not None and any(one.kind in _ROAD_USERS for one in references_of(self._next))
+        looks = self._next is not None and any(one.kind in ROAD_USERS for one in references_of(self._next))
         pace = min(self._pace, _LOOKING_MPS) if looks else self._pace
         beyond = (
             _LOOKS_FROM_M if looks else _CHANGES_FROM_M if self._next is not None and self._next.act == "lane" else 0.0
@@ -376,7 +370,7 @@ class _Composer:
         """Whether an act is done by a road user that is seen before the next junction."""
         if act is None or act.act not in _STANDS | {"avoid", "pass"}:
             return False
-        users = [one for one in references_of(act) if one.kind in _ROAD_USERS]
+        users = [one for one in references_of(act) if one.kind in ROAD_USERS]
         fits = [target for one in users for target in ground(one, self._seen, act.act).fits]
         return any(self._before_junction(target) and target.forward_m > 0.0 for target in fits)
 
@@ -402,7 +396,7 @@ class _Composer:
         there = index + (-1 if side == "left" else 1)
         if not self._moved_on and act.to is None and not 0 <= there < count:
             raise _UndoableError(f"there is no lane to the {side} of ours")
-        if act.place is not None and act.place.ref is not None and act.place.ref.kind in _ROAD_USERS:
+        if act.place is not None and act.place.ref is not None and act.place.ref.kind in ROAD_USERS:
             for lines, name in self._user(act.place.ref, act):
                 if act.place.rel in ("after", "in_front_of"):
                     yield from lines
@@ -468,7 +462,7 @@ class _Composer:
                 raise _UndoableError("I see no traffic light ahead")
             yield f"yield from until_green({pace})"
             return
-        if when.ref is None or when.ref.kind not in _ROAD_USERS:
+        if when.ref is None or when.ref.kind not in ROAD_USERS:
             if when.event == "clear":
                 yield f"yield from until_clear({pace})"
                 return
@@ -499,7 +493,7 @@ class _Composer:
 
     def _grounded(self, reference: Reference, act: Act) -> Grounded:
         found = self._referents.get(reference)
-        before = spoken_of(reference, self._referents) if reference.kind in _ROAD_USERS else None
+        before = spoken_of(reference, self._referents) if reference.kind in ROAD_USERS else None
         if found is None and before is not None:
             found = self._referents[reference] = self._referents[before]
         if found is None:
@@ -516,7 +510,7 @@ class _Composer:
     def _user(self, reference: Reference, act: Act) -> Iterator[tuple[list[str], str]]:
         """Lines that name the road users which a reference means, and the name of each; such as come into sight after
         a turn are looked for there."""
-        if reference.kind not in _ROAD_USERS:
+        if reference.kind not in ROAD_USERS:
             raise _UndoableError(f"I cannot make out {reference_words(reference)} here")
         found = self._grounded(reference, act)
         here = found.targets
