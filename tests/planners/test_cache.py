@@ -36,7 +36,11 @@ def test_only_the_owner_can_read_it_and_the_root_is_left_alone(tmp_path):
     cache = ReplyCache(tmp_path)
     cache.folder.mkdir(mode=0o777)
     cache.folder.chmod(0o777)
-    cache.put(KEY, KEPT)
+    before = os.umask(0)
+    try:
+        cache.put(KEY, KEPT)
+    finally:
+        os.umask(before)
     assert stat.S_IMODE(tmp_path.stat().st_mode) == 0o755
     assert stat.S_IMODE(cache.folder.stat().st_mode) == 0o700
     assert stat.S_IMODE(path_of(cache).parent.stat().st_mode) == 0o700
@@ -190,13 +194,3 @@ def test_prices_are_known_or_none():
     assert cost_usd("api.openai.com", "gpt-4o-2024-08-06", 1000, 0) == pytest.approx(0.0025)
     assert cost_usd("localhost", "gpt-4o", 1000, 0) is None
     assert cost_usd("api.openai.com", "gpt-99", 1000, 0) is None
-
-
-def test_entries_are_written_with_the_process_umask_ignored(tmp_path):
-    before = os.umask(0)
-    try:
-        cache = ReplyCache(tmp_path)
-        cache.put(KEY, KEPT)
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE(path_of(cache).stat().st_mode) == 0o600

@@ -37,11 +37,6 @@ def test_pictures_go_out_as_they_are_each_behind_the_name_of_its_camera(server, 
         assert CameraImage(view.camera, view.time_s, base64.b64decode(data)) == view
 
 
-def test_a_request_without_pictures_is_words_alone(server, bench, make_request):
-    bench.plan(asked=make_request("hold 25 m/s"))
-    assert all(isinstance(message["content"], str) for message in server.requests[0].body["messages"])
-
-
 @pytest.mark.parametrize(
     ("status", "said"),
     [

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
-from server import REPLY, body, events, fails, silent, stream, whole
+from server import REPLY, events, fails, silent, stream, whole
 
 from chauffeur.concept import ConfigError, Limits, Program
 from chauffeur.planners import make_planner
-from chauffeur.planners.llm_endpoint import Sampling
 from chauffeur.planners.llm_errors import EndpointError
 from chauffeur.planners.llm_settings import VARIABLES, LlmSettings, settings_from
 from chauffeur.planners.prompts import build_system_message
@@ -26,12 +25,6 @@ def test_a_server_that_answers_whole_although_asked_for_a_stream(server, bench):
     plan = bench.plan(stream=True, on_text=lambda text, number: heard.append(text))
     assert (plan.policy, plan.usage) == (streamed.policy, streamed.usage)
     assert "".join(heard) == REPLY and len(server.requests) == 2
-
-
-def test_a_server_that_streams_although_asked_for_a_whole_reply(server, bench):
-    plan = bench.plan(stream=False)
-    assert isinstance(plan.policy, Program)
-    assert len(server.requests) == 1
 
 
 @pytest.mark.parametrize(
@@ -226,10 +219,3 @@ def test_the_environment_reaches_the_endpoint(server, monkeypatch, make_request,
     with pytest.raises(EndpointError, match=r"within 0\.2 s"):
         asyncio.run(run())
     assert server.requests[0].body["max_tokens"] == 321
-
-
-def test_a_flood_in_one_piece_is_not_read_to_its_end(server, bench, monkeypatch):
-    monkeypatch.setattr("chauffeur.planners.llm_endpoint._MAX_BODY_BYTES", 1_000)
-    server.script(body(b"{" + b" " * 5_000, "application/json"))
-    with pytest.raises(EndpointError, match="more than"):
-        bench.plan(stream=False, sampling=Sampling())

@@ -1,4 +1,4 @@
-"""What is wrong with an answer from outside: a body that is not read, and a server's own words."""
+"""Complaints about answers from outside: bodies that are not read, and a server's own words."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ForeignBodyError(ChauffeurError):
 
 
 def server_words(found: object, depth: int = 0) -> str:
-    """What a server says is wrong, out of any of the envelopes in use; empty where there are no words."""
+    """A server's own words for an error, out of any of the envelopes in use; empty if there are none."""
     if isinstance(found, str):
         return found.strip()
     if depth < _DEPTH and isinstance(found, list):

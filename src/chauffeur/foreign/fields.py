@@ -26,7 +26,7 @@ _PLACEHOLDER: Final = re.compile(r"[<\[{][^<>\[\]{}]{0,160}[>\]}]|[\W_]*")
 
 
 def says_nothing(value: object) -> bool:
-    """Whether a field is empty, or says in so many words that it is: `N/A`, `none`, `-`, null, a placeholder.
+    """True if a field is empty, or says in so many words that it is: `N/A`, `none`, `-`, null, a placeholder.
 
     "No lane is free" and "None of the lanes is free" say something.
     """

@@ -89,7 +89,7 @@ _MESSAGE: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class ModelText:
-    """What a model wrote.
+    """A model's text, split.
 
     Attributes:
         answer: Its answer; empty where it never came to one.
@@ -155,7 +155,7 @@ class _Scan:
         self._fence = ""
         self._blocks = 0
         self._spoken = False
-        """Whether anything but blanks was kept."""
+        """True if anything but blanks was kept."""
         self._lasts: dict[re.Pattern[str], int] = {}
 
     def run(self) -> None:
@@ -193,7 +193,7 @@ class _Scan:
             self._at_speaker(mark)
 
     def _is_said(self, mark: re.Match[str]) -> bool:
-        """Whether a mark is only spoken of: in a code span, or in a comment or string of a fenced program."""
+        """True if a mark is only spoken of: in a code span, or in a comment or string of a fenced program."""
         before, behind = self.text[: mark.start()][-2:], self.text[mark.end() : mark.end() + 1]
         if before.endswith("`") and before != "``" and behind == "`":
             return True
@@ -272,7 +272,7 @@ class _Scan:
             self.over = True
 
     def _last(self, pattern: re.Pattern[str]) -> int:
-        """Where the last match begins; -1 where there is none."""
+        """Start of the last match; -1 if there is none."""
         if pattern not in self._lasts:
             self._lasts[pattern] = max((found.start() for found in pattern.finditer(self.text)), default=-1)
         return self._lasts[pattern]

@@ -1,4 +1,4 @@
-"""What somebody ends up saying who corrects themselves: "stay behind, no wait, overtake him"."""
+"""Self-corrections: "stay behind, no wait, overtake him"."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _LEADS_IN: Final = frozenset(("to", "the", "at", "on", "a", "go", "of", "lane", 
 
 
 def last_said(text: str) -> str:
-    """What is left of a text when its speaker has corrected themselves; the whole text where they have not.
+    """A text after its self-corrections; the whole text if there are none.
 
     Where a mere side or number takes the place of another, the rest of the wish stays: "do seventy, no wait, sixty".
     """

@@ -1,4 +1,4 @@
-"""What words say is not to be done: "don't turn left", "anything but right"."""
+"""Words that a denial reaches: "don't turn left", "anything but right"."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ _NO_DISTRESS: Final = re.compile(
 
 
 def safe_stop_in(line: str) -> re.Match[str] | None:
-    """Where a line asks for a stop at the next safe place; None if it does not."""
+    """Match of a request to stop at the next safe place; None if there is none."""
     return _SAFE.search(line)
 
 
@@ -154,5 +154,5 @@ def distress_in(line: str) -> str:
 
 
 def is_only_told(line: str) -> bool:
-    """Whether a line speaks of distress at another time, of others or in a manner of speaking."""
+    """True if a line speaks of distress at another time, of others or in a manner of speaking."""
     return _NO_DISTRESS.search(line) is not None

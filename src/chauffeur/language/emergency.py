@@ -31,7 +31,7 @@ SAFE_STOP_WISH: Final = "Stop at the next safe place."
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """What was read.
+    """An emergency in words.
 
     Attributes:
         kind: What the car is to do about it.
@@ -49,7 +49,7 @@ class Emergency:
 
 
 def read_emergency(text: str) -> Emergency | None:
-    """What an utterance has of an emergency, in English or a language of `languages`; None where it has nothing."""
+    """The emergency in an utterance, in English or a language of `languages`; None if there is none."""
     found = _read_english(text)
     if found is not None and found.kind == "stop":
         return found
@@ -173,7 +173,7 @@ _SUPPOSED: Final = re.compile(
 
 
 def _stops_in(line: str) -> list[tuple[int, str]]:
-    """Where a line asks for a stop; what a sentence only supposes ("if ..., brake") asks for none."""
+    """Positions and words of stops in a line; what a sentence only supposes ("if ..., brake") is none."""
     found: list[tuple[int, str] | None] = []
     for sentence, begin in sentences_of(line):
         if _SUPPOSED.match(sentence) is not None:
@@ -186,7 +186,7 @@ def _stops_in(line: str) -> list[tuple[int, str]]:
 
 
 def _stop_in(piece: str, at: int) -> tuple[int, str] | None:
-    """Where a stretch asks for a stop, and the words; None if it does not."""
+    """Position and words of a stop in a stretch; None if there is none."""
     found = _STOP_CLAUSE.match(piece) or _CALL.match(piece) or _HOMOPHONE.match(piece)
     if found is None:
         found = _NEED.match(piece)
@@ -247,7 +247,7 @@ _FILLER: Final = re.compile(
 
 
 def _is_filler(masked: str) -> bool:
-    """Whether nothing is left that a planner could be asked for."""
+    """True if nothing is left that a planner could be asked for."""
     rest = re.sub(r"~+", " ~ ", masked)
     return _FILLER.match(re.sub(r"\s+", " ", f" {rest.strip()}")) is not None
 
@@ -279,5 +279,5 @@ _OF_NONE: Final = re.compile(
 
 
 def tells_of_alarm(thoughts: str) -> bool:
-    """Whether a model's own words say that a person asks for a stop at once, or is in distress."""
+    """True if a model's own words say that a person asks for a stop at once, or is in distress."""
     return _TOLD_OF.search(_OF_NONE.sub(" ", line_of(thoughts))) is not None

@@ -77,7 +77,7 @@ class GrammarFrame:
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """How sentences are rounded off.
+    """Frames and endings of sentences.
 
     Attributes:
         frames: Put around imperatives, all equally likely; repeat one to make it more so.
@@ -153,11 +153,11 @@ class Grammar:
         return self._sections[section] if held is None else self._apart[section][held]
 
     def question(self, section: str) -> str:
-        """What to ask back about the wishes of a section; empty where they need no question."""
+        """Question about the wishes of a section; empty if they need none."""
         return self._reply(section, "?")
 
     def reason(self, section: str) -> str:
-        """Why the wishes of a section are refused; empty where they are not."""
+        """Reason to refuse the wishes of a section; empty if they are not refused."""
         return self._reply(section, "!")
 
     def _reply(self, section: str, kind: str) -> str:

@@ -1,4 +1,4 @@
-"""Which road user, light, sign or junction in sight a reference means.
+"""Grounding of references: the road users, lights, signs and junctions in sight that words mean.
 
 Attributes are filters: each one that is said leaves the same candidates or fewer. Of what is left an ordinal counts
 from the nearest, "that one" is the nearest ahead, a plural is all of them; of several alike the passenger is asked by
@@ -65,7 +65,7 @@ TargetKind = Literal["agent", "light", "sign", "junction"]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a reference may mean.
+    """A candidate of a reference.
 
     Attributes:
         kind: What sort of thing it is.
@@ -93,7 +93,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Grounded:
-    """What a reference means at an instant.
+    """A reference resolved at an instant.
 
     Attributes:
         reference: The words.
@@ -113,7 +113,7 @@ class Grounded:
 
 
 def ground(reference: Reference, observation: Observation, verb: Verb | None = None) -> Grounded:
-    """What a reference means.
+    """Resolve a reference.
 
     Args:
         reference: What was said.
@@ -133,7 +133,7 @@ def reference_of(kind: str, colour: str = "", state: str = "", side: str = "") -
 
 
 def spoken_of(reference: Reference, before: Iterable[Reference]) -> Reference | None:
-    """Which of the references before it one takes up: of its kind, told by nothing that was not said of that one."""
+    """The earlier reference that one takes up: of its kind, told by nothing that was not said of that one."""
     if reference.kind in PLURALS:
         return None
     return next((one for one in reversed(tuple(before)) if one != reference and _takes_up(reference, one)), None)
@@ -325,7 +325,7 @@ def _suits(agent: VehicleState, seen: Target, observation: Observation, verb: Ve
 
 
 def _clearly(able: Sequence[Target]) -> bool:
-    """Whether the first is so much nearer than the second that nobody would ask."""
+    """True if the first is so much nearer than the second that nobody would ask."""
     first, second = able[0].away_m, able[1].away_m
     return second > _CLEARLY * first and second - first > _CLEARLY_M
 
@@ -380,7 +380,7 @@ def _plural(reference: Reference) -> str:
 
 
 def _absent(reference: Reference, observation: Observation) -> str:
-    """Why nothing is meant, by the first attribute that nothing in sight has."""
+    """Reason why nothing is meant, by the first attribute that nothing in sight has."""
     bare = Reference(reference.kind)
     if reference.kind not in _SEEN:
         return f"I cannot make out a {reference.kind.replace('_', ' ')} here."

@@ -109,7 +109,7 @@ _SIGNS: Final = re.compile(r"[.,! ]+")
 
 
 def hazard_in(piece: str, sentence: str) -> re.Match[str] | None:
-    """Where a stretch of a line says that something stands in the way; None if it does not.
+    """Match of a hazard in a stretch of a line; None if there is none.
 
     Args:
         piece: A stretch between two signs, a space around it.

@@ -29,7 +29,7 @@ _WORD: Final = re.compile(r"\w+")
 
 
 def ignorable(char: str) -> bool:
-    """Whether a character is invisible, or can be: control, format, private, unassigned, or left out by displays."""
+    """True if a character is invisible, or can be: control, format, private, unassigned, or left out by displays."""
     return unicodedata.category(char)[0] == "C" or _IGNORABLE.match(char) is not None
 
 
@@ -67,7 +67,7 @@ def _clean_line(line: str) -> str:
 
 
 def dressed(char: str) -> bool:
-    """Whether a character stands for an ASCII letter, digit or sign, as full-width and mathematical letters do."""
+    """True if a character stands for an ASCII letter, digit or sign, as full-width and mathematical letters do."""
     return not char.isascii() and not char.isspace() and fold_char(char).isascii()
 
 
@@ -95,12 +95,12 @@ def folded(pattern: str) -> str:
 
 
 def mixed(word: str) -> bool:
-    """Whether a word has Latin letters together with look-alikes of other scripts."""
+    """True if a word has Latin letters together with look-alikes of other scripts."""
     return any("a" <= char.lower() <= "z" for char in word) and any(char in _CONFUSABLE for char in word.lower())
 
 
 def words_that_mix(text: str) -> Iterator[tuple[int, int]]:
-    """Where words stand that mix scripts; accented and national Latin letters do not count."""
+    """Positions of words that mix scripts; accented and national Latin letters do not count."""
     for word in _WORD.finditer(text):
         if mixed(word[0]) and any(_foreign(char) for char in word[0]):
             yield word.span()

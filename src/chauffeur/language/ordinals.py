@@ -1,4 +1,4 @@
-"""Which of several junctions words mean: "the third street on the left", "two more sets of lights, then right"."""
+"""Ordinals of junctions: "the third street on the left", "two more sets of lights, then right"."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _MOST: Final = 9
 
 
 def nth_of(words: str) -> int:
-    """Which of several ways is meant, 1 for the next: 3 for "the third street" and for "after two more junctions".
+    """Number of the way that is meant, 1 for the next: 3 for "the third street" and for "after two more junctions".
 
     An ordinal counts where it stands with a way or a side, and not "the third house".
     """

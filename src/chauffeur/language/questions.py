@@ -64,7 +64,7 @@ _GOODBYES: Final = re.compile(
 
 
 def is_question(text: str) -> bool:
-    """Whether all of a text has the form of a question, and none of it that of a request.
+    """True if all of a text has the form of a question, and none of it that of a request.
 
     Args:
         text: What a person says.
@@ -80,7 +80,7 @@ def is_question(text: str) -> bool:
 
 
 def said_aside(text: str) -> bool:
-    """Whether words are said beside the driving, a question or an acknowledgement, and take back nothing said before.
+    """True if words are said beside the driving, a question or an acknowledgement, and take back nothing said before.
 
     Args:
         text: What a person says.
@@ -89,7 +89,7 @@ def said_aside(text: str) -> bool:
 
 
 def ends_session(text: str) -> bool:
-    """Whether a person takes leave: `quit`, `exit`, `bye`. Nothing longer that could be a way to drive.
+    """True if a person takes leave: `quit`, `exit`, `bye`. Nothing longer that could be a way to drive.
 
     Args:
         text: What a person says.

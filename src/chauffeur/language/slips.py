@@ -68,7 +68,7 @@ class Slip:
 
     @property
     def question(self) -> str:
-        """What to ask the person."""
+        """The question for the person."""
         if self.meant:
             return f"Did you mean {self.meant}?"
         return f"Which {_NOUNS.get(self.dimension, 'number')} do you mean?"
@@ -76,7 +76,7 @@ class Slip:
 
 @dataclass(frozen=True, slots=True)
 class _Chunk:
-    """What stands between two spaces: without brackets and the sign that ends a clause."""
+    """Text between two spaces, without brackets and the sign that ends a clause."""
 
     text: str
     start: int
@@ -244,7 +244,7 @@ def _spelled_apart(chunks: list[_Chunk], index: int) -> _Found | None:
 
 
 def _one_number(words: list[str]) -> bool:
-    """Whether number words are one number: twenty-five, one twenty, one twenty-five."""
+    """True if number words are one number: twenty-five, one twenty, one twenty-five."""
     ones, tens = ONES[1:10], TENS
     match words:
         case [first, second]:
@@ -280,7 +280,7 @@ def _mistyped(start: int, end: int, value: float, words: str) -> _Found:
 
 
 def _one_slip(words: str, unit: str) -> bool:
-    """Whether one letter too many, too few or wrong, or two exchanged, make the one of the other."""
+    """True if one letter too many, too few or wrong, or two exchanged, make the one of the other."""
     shorter, longer = sorted((words, unit), key=len)
     places = range(len(longer))
     if len(longer) == len(shorter) + 1:
@@ -292,7 +292,7 @@ def _one_slip(words: str, unit: str) -> bool:
 
 
 def _like_unit(words: str) -> bool:
-    """Whether words behind a number can only be a unit, and are none we know."""
+    """True if words behind a number can only be a unit, and are none we know."""
     if _known(words) is not None:
         return False
     parts = re.split(r"[/\\|.]", words)
@@ -302,7 +302,7 @@ def _like_unit(words: str) -> bool:
 
 
 def _ways(words: str) -> list[str]:
-    """What may be meant by digits with something else among them."""
+    """Readings of digits with something else among them."""
     thousands = _THOUSANDS.fullmatch(words)
     return [thousands[1] + thousands[2], thousands[1]] if thousands else [words]
 
@@ -312,7 +312,7 @@ def _digits_typed(words: str) -> str:
 
 
 def _odd_label(words: str) -> bool:
-    """Whether what may be a label is rather a mistyped number: no exit is called 5o, and no road l00."""
+    """True if what may be a label is rather a mistyped number: no exit is called 5o, and no road l00."""
     return _TYPED_FOR_DIGITS.fullmatch(words) is not None and (words[0].isdigit() or words[1:2] == "0")
 
 

@@ -35,7 +35,7 @@ _REACH: Final = 4
 
 
 def hashed_features(text: str) -> Array:
-    """What a sentence is known by, as numbers, each once and in order; shape (n,), empty for a text without words.
+    """Hashed features of a sentence, unique and sorted; shape (n,), empty for a text without words.
 
     Its words, pairs of neighbours, pairs with one word between, words that a negation reaches, and parts of words.
     """
@@ -88,7 +88,7 @@ class TextClassifier:
         self._weights, self._steps, self._bias = weights, steps, bias
 
     def scores(self, text: str) -> Array:
-        """How well a text fits each kind, as logarithms of shares but for a constant; shape (kinds,)."""
+        """Logits of the kinds for a text; shape (kinds,)."""
         marks = hashed_features(text)
         if not len(marks):
             return self._bias.copy()
@@ -96,7 +96,7 @@ class TextClassifier:
         return summed * self._steps / np.sqrt(len(marks)) + self._bias
 
     def shares(self, text: str, among: Collection[str] | None = None) -> Mapping[str, float]:
-        """How likely each kind is, the likeliest first; together 1.
+        """Probabilities of the kinds, the likeliest first; they sum to 1.
 
         Args:
             text: What was said.

@@ -1,4 +1,4 @@
-"""What kind of weather it is: as a service words it, and as a passenger says it in passing.
+"""Kinds of weather, as a service words them and as a passenger mentions them in passing.
 
 Services have a small vocabulary, which patterns read; memory tells trips apart by it. People have none ("the road's
 like glass by that stop line"), so a learned sorter reads them (`chauffeur.language.text_classifier`).
@@ -80,7 +80,7 @@ def said_weather(text: str, sorter: TextClassifier | None = None) -> SaidWeather
 
 
 def without_said_weather(text: str) -> str:
-    """What is left of a wish without the clauses that say something of the weather or the road; empty for nothing."""
+    """A wish without the clauses about weather or road; empty if nothing is left."""
     parts, begin, kept = list[tuple[str, str]](), 0, list[str]()
     for sign in _CLAUSES.finditer(text):
         parts.append((text[begin : sign.start()], sign[0]))

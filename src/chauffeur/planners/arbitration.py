@@ -1,7 +1,7 @@
-"""What planners ask before they drive, in one question that a yes answers: numbers that are none, what the words deny,
+"""Questions before a drive, each answered by a yes: numbers that cannot be read, things that the words deny,
 a stop in the lane, a crawl among faster traffic.
 
-What was said outright is certain: a side, a number, a pace. Of a thing that was said and taken back the last counts.
+Of a thing that was said and taken back the last counts.
 """
 
 from __future__ import annotations
@@ -83,11 +83,11 @@ def intent_pace(intent: str) -> int:
 
 
 def wary_of(text: str, intent: str) -> bool:
-    """Whether somebody who wants to be quick says in the same breath that the road is slippery or the sight bad.
+    """True if a passenger in a hurry says in the same breath that the road is slippery or the sight bad.
 
     Args:
         text: Their words.
-        intent: What they were read as; only a mood counts, who asks for more speed outright is to have it.
+        intent: Tag of their reading; only a mood counts, an outright wish for more speed is followed.
     """
     return "style." in intent and intent_pace(intent) > 0 and said_weather(text) != "none"
 
@@ -98,7 +98,7 @@ def unanswered(instruction: Instruction, question: str) -> str:
 
 
 def slow_words(steps: Iterable[Chosen], situation: Situation, limits: Limits) -> str:
-    """Why a plan endangers those behind us: it stops in the lane, or crawls; empty where it does neither."""
+    """Reason why a plan endangers following traffic: it stops in the lane, or crawls; empty if it does neither."""
     for step in steps:
         if step.intent.startswith("pull_over"):
             continue  # to a stand, but not in anybody's way
@@ -150,7 +150,7 @@ def asked(planner: Planner, question: str, begun: float, *, offer: str = "", raw
 
 
 def denied_intent(text: str, intent: str) -> tuple[str, str] | None:
-    """What to offer for a thing to do that the words deny: (wish, how it is asked about); None where they deny none.
+    """Offer for a thing to do that the words deny: (wish, how it is asked about); None if they deny none.
 
     What is said both with and without a negation ("not the left lane, the left turn") counts as wanted.
 

@@ -1,4 +1,4 @@
-"""What a planner must offer, and the shared idea of its price in time."""
+"""The protocol of planners, and the plans that they sign."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Planner(Protocol):
 
 
 def looks(planner: Planner) -> bool:
-    """Whether pictures are to be taken for a planner: it says so by an attribute `sees`."""
+    """True if pictures are to be taken for a planner, which says so by an attribute `sees`."""
     return bool(getattr(planner, "sees", False))
 
 
@@ -100,7 +100,7 @@ def declined(
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """What a planner sends its model first.
+    """The first request of a planner to its model.
 
     Attributes:
         url: Where to.
@@ -118,7 +118,7 @@ class Prompting(Protocol):
     """A planner that sends a prompt."""
 
     def prompt(self, request: PlanRequest) -> Prompt:
-        """What would be sent first for a request; nobody is asked."""
+        """The first prompt for a request, without sending it."""
         ...
 
 

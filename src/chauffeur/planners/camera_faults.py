@@ -42,7 +42,7 @@ def small(pixels: Array) -> Array:
 
 
 def camera_fault(images: Sequence[CameraImage], earlier: CameraImage | None = None) -> str:
-    """What is wrong with a camera's pictures, in words; empty where nothing is.
+    """Fault of a camera by its pictures, in words; empty if there is none.
 
     Args:
         images: V of a request, oldest first, of one camera.
@@ -63,7 +63,7 @@ def camera_fault(images: Sequence[CameraImage], earlier: CameraImage | None = No
 
 
 def picture_fault(pixels: Array) -> str:
-    """What is wrong with a picture (H, W, 3) uint8, in words; empty where nothing is."""
+    """Fault of a picture (H, W, 3) uint8, in words; empty if there is none."""
     grey = small(pixels).astype(np.float64).mean(axis=2)
     median = float(np.median(grey))
     if float((np.abs(grey - median) <= _GREY_LEVELS).mean()) > _ONE_COLOUR_SHARE:

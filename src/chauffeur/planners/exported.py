@@ -8,7 +8,7 @@ from typing import Any
 
 
 def open_exported(folder: Path, threads: int) -> tuple[dict[str, Any], Any]:
-    """What stands in `model.json` of a model folder, and a session over its `model.onnx`.
+    """Contents of `model.json` of a model folder, and a session over its `model.onnx`.
 
     Args:
         folder: Where they are.

@@ -152,7 +152,7 @@ class LlmPlanner:
         return await self._chat.write(messages)
 
     def prompt(self, request: PlanRequest) -> Prompt:
-        """What would be sent first for a request. Asks nobody, needs no key."""
+        """The first prompt for a request, without sending it; needs no key."""
         return self._chat.prompt(build_messages(request))
 
     async def close(self) -> None:
@@ -185,7 +185,7 @@ class LlmPlanner:
         return completion, reply, self._findings(reply.source, request) if reply.source is not None else []
 
     def _findings(self, source: str, request: PlanRequest) -> list[str]:
-        """What the checks find in a program: not of the language; else numbers and moves that road or limits forbid."""
+        """Findings in a program: those of the language, else numbers and moves that road or limits forbid."""
         library = request.system.library
         kind = request.context.situation.world
         found = program_findings(source, library, kind) if self._gate is None else self._gate(source)
@@ -202,7 +202,7 @@ def _program(source: str, library: str) -> Program:
 
 
 def program_findings(source: str, library: str = "", kind: str = "") -> list[str]:
-    """What the gate of `chauffeur.programs` finds in a program that may call a library, in words."""
+    """Findings of the gate of `chauffeur.programs` in a program that may call a library, in words."""
     from chauffeur.programs.catalogue import vocabulary_of
     from chauffeur.programs.gate import check_source
 

@@ -43,7 +43,7 @@ _PROMPT = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Shortage:
-    """What a server said of a prompt that is too long for it.
+    """Sizes that a server reported for a prompt that is too long.
 
     Attributes:
         size: Tokens of its context; None when it did not say.
@@ -74,7 +74,7 @@ def tokens_about(messages: Sequence[Mapping[str, Any]]) -> int:
 
 
 def was_cut(messages: Sequence[Mapping[str, Any]], counted: int) -> bool:
-    """Whether a server cannot have read all of a prompt of which it counted so many tokens. 0: it did not say."""
+    """True if a server cannot have read all of a prompt of which it counted so many tokens. 0: it did not say."""
     return 0 < counted < _characters(messages) / _CUT_CHARS_PER_TOKEN
 
 

@@ -217,7 +217,7 @@ class Endpoint:
         return re.sub(rf"(?<!\w){re.escape(found[0])}(?!\w)", "***", text) if found else text
 
     def body(self, messages: list[Message], sampling: Sampling) -> dict[str, Any]:
-        """What is sent for a conversation, key and headers aside."""
+        """Request body of a conversation."""
         turns = _without_system(messages) if self._folded else messages
         body: dict[str, Any] = {"model": self._model, "messages": turns, **sampling.parameters()}
         if self._stream:
@@ -230,7 +230,7 @@ class Endpoint:
         return body
 
     def _adapt(self, body: dict[str, Any], error: Exception) -> bool:
-        """Whether the server only disliked an optional parameter, which is renamed or left out from now on.
+        """True if the server only disliked an optional parameter, which is renamed or left out from now on.
 
         Reasoning models take `max_completion_tokens` and no temperature; older servers know no stream options; some
         stream only, some never do.
@@ -366,7 +366,7 @@ async def _head(pieces: AsyncIterator[bytes]) -> bytes:
 
 
 def _parsed(content: bytes) -> object:
-    """What an answer that is no success holds: JSON, or text."""
+    """Body of an answer that is no success: JSON, or text."""
     try:
         return json.loads(content)
     except (ValueError, RecursionError):
@@ -423,12 +423,12 @@ class _Events:
 
 
 class _Tally:
-    """What has arrived of a reply. Trusts no field."""
+    """The part of a reply that has arrived; trusts no field."""
 
     def __init__(self, max_chars: int) -> None:
         self.parts: list[str] = []
         self.seen = False
-        """Whether anything came that is of the protocol."""
+        """True if anything came that is of the protocol."""
         self.complaint: object = None
         """What came that is not of the protocol and has words."""
         self.declined = False

@@ -1,4 +1,4 @@
-"""What can go wrong with an endpoint, told apart, each with what the reader can do about it."""
+"""Failures of an endpoint by kind, each with its remedy."""
 
 from __future__ import annotations
 

@@ -81,12 +81,12 @@ _DECLINED: Final = frozenset({"refusal", "content_filter"})
 
 
 def was_cut(completion: Completion) -> bool:
-    """Whether a reply ended otherwise than by its model's own will; a word that is not known counts as such."""
+    """True if a reply ended otherwise than by its model's own will; a word that is not known counts as such."""
     return completion.finish.lower() not in _WHOLE
 
 
 def declines(completion: Completion) -> bool:
-    """Whether the endpoint marks a reply as a refusal, or its filter held it back."""
+    """True if the endpoint marks a reply as a refusal, or its filter held it back."""
     return completion.finish in _DECLINED
 
 
@@ -95,7 +95,7 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class ChatBill:
-    """What one plan, or one answer, has cost so far."""
+    """Cost of one plan, or one answer, so far."""
 
     prompt_tokens: int = 0
     completion_tokens: int = 0
@@ -218,7 +218,7 @@ class ChatModel:
         return Prose(said.answer.strip(), not said.cut, model, usage, declined=declines(completion))
 
     async def within_budget(self, work: Awaitable[T]) -> T:
-        """What a whole plan's asking comes to. Raises EndpointError when it takes longer than it may."""
+        """Await work within the budget of a plan. Raises EndpointError when it takes longer."""
         try:
             async with asyncio.timeout(self._budget_s):
                 return await work
@@ -226,7 +226,7 @@ class ChatModel:
             raise timed_out(self._address.url, self._budget_s) from None
 
     def prompt(self, messages: list[Message]) -> Prompt:
-        """What would be sent. Asks nobody, needs no key."""
+        """The request that would be sent, without sending it; needs no key."""
         body = self._endpoint.body(messages, self._sampling)
         sent: list[Message] = body.pop("messages")
         return Prompt(f"{self._address.url}/chat/completions", sent, body)

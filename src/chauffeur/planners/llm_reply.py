@@ -23,7 +23,7 @@ _REASON_CHARS: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What a reply holds.
+    """A reply, split.
 
     Attributes:
         thoughts: R, without programs and labels.
@@ -75,7 +75,7 @@ def read_reply(text: str, *, cut: bool = False) -> Reply:
 
 
 def refusal_in(prose: str, *, beside: bool) -> str | None:
-    """Why the model declines, empty where it does not say; None where it does not decline.
+    """The model's reason for declining, empty if it gives none; None if it does not decline.
 
     Args:
         prose: The answer without its blocks.

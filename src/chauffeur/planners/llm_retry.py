@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class RetryPolicy:
-    """How often and how patiently.
+    """Attempts and waits of one request.
 
     Attributes:
         attempts: Requests at most, the first included.

@@ -20,7 +20,7 @@ _PLAN_S: Final = 180.0
 
 @dataclass(frozen=True, slots=True)
 class LlmSettings:
-    """How a model is asked.
+    """Sampling, limits and patience for one model.
 
     Attributes:
         temperature: 0..2; None leaves it to the server. CHAUFFEUR_TEMPERATURE (`server` for None).

@@ -168,7 +168,7 @@ class MotionPlanner:
         return replace(chosen, latency_s=time.perf_counter() - begun)
 
     def _blind(self, fault: str, begun: float) -> Plan:
-        """What is driven without a picture to go by."""
+        """The most careful gains, for a camera that shows nothing."""
         policy, scene = most_careful(), f"{fault}: I cannot see road or weather."
         return planned(
             self,
@@ -193,7 +193,7 @@ class MotionPlanner:
         return await self._writer.write([{"role": one["role"], "content": words_of(one)} for one in messages])
 
     async def _asked(self, request: PlanRequest) -> Plan:
-        """What the model makes of a reading of the situation; what the checks find is said once, for it to repair."""
+        """Ask the model about one reading of the situation, and once more with the findings of the checks."""
         begun = time.perf_counter()
 
         def findings(answer: tuple[ActionMatrix | None, Reply]) -> list[str]:

@@ -98,7 +98,7 @@ def _built(name: str, build: Callable[..., object], argument: str, options: dict
 
 
 def takes_option(spec: str, option: str) -> bool:
-    """Whether the planner a specification names has a setting of that name. Raises ConfigError as `make_planner`."""
+    """True if the planner a specification names has a setting of that name. Raises ConfigError as `make_planner`."""
     return option in _options_of(inspect.signature(_builder(spec.strip().partition("/")[0])))
 
 

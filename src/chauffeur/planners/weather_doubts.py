@@ -1,4 +1,4 @@
-"""What a passenger says of weather or road beside a wish never makes its plan faster.
+"""A remark on weather or road beside a wish never makes its plan faster.
 
 A learned reading may take a wish for another one when a clause is added to it. So a wish with such a clause is planned
 as it stands and without it, and of the two plans the slower one is driven. Planners of gains do the same by the care of

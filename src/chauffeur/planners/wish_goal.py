@@ -1,4 +1,4 @@
-"""What a wish asks for, in the terms that a drive is judged by: for planners whose model does not say it.
+"""The goal of a wish in the terms of the judge, for planners whose model does not state it.
 
 A language model writes a program and no intent, so its drives would have no goal where the on-board planner's have one.
 The wish is read by the same rules for all of them. The goal judges and never drives: where the rules do not understand

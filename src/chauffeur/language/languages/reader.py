@@ -131,7 +131,7 @@ class _Table:
         return " ".join(self._filler.sub(blank, words).split())
 
     def negated(self, words: str) -> bool:
-        """Whether any word denies something; "can you not" asks for it."""
+        """True if any word denies something; "can you not" asks for it."""
         words = self._lead.sub("", words)
         return not self.negations.isdisjoint(words if self.spaceless else words.split())
 
@@ -181,7 +181,7 @@ def _english() -> frozenset[str]:
 
 
 def _is_english(text: str) -> bool:
-    """Whether a folded text has no word that English has not."""
+    """True if a folded text has no word that English has not."""
     return _english().issuperset(_WORD.findall(text))
 
 

@@ -44,12 +44,12 @@ _UNCLEAR: Final = Act("unclear")
 
 
 def is_elliptical(turn: Utterance) -> bool:
-    """Whether words mean something only beside the turn before: no planner can make anything of them alone."""
+    """True if words mean something only beside the turn before: no planner can make anything of them alone."""
     return turn.sure >= _SURE and not turn.emergency and any(act.act in _ELLIPTICAL for act in turn.acts)
 
 
 def resolved(now: Utterance, last: Utterance | None) -> Utterance:
-    """What words mean after those before them.
+    """Resolve words against the turn before.
 
     Args:
         now: As it was read by itself.
@@ -64,7 +64,7 @@ def resolved(now: Utterance, last: Utterance | None) -> Utterance:
     before = () if last is None else wishes(last.acts)
     acts: list[Act] = []
     corrects = True
-    """Whether nothing but answers was said yet: a choice is about the turn before."""
+    """True if nothing but answers was said yet: a choice is about the turn before."""
     for act in now.acts:
         own = () if corrects else wishes(acts)
         match act.act:
@@ -86,7 +86,7 @@ def resolved(now: Utterance, last: Utterance | None) -> Utterance:
 
 
 def _corrected(pick: Act, act: Act, by: Sequence[Act]) -> bool:
-    """Whether an act of the same text is said anew by a choice after it: more of something comes on top of it."""
+    """True if an act of the same text is said anew by a choice after it: more of something comes on top of it."""
     if pick.value is not None or pick.aim is not None:
         return any(act.act == one.act for one in by)
     return pick.direction is None
@@ -178,7 +178,7 @@ def _changed(pick: Act, before: tuple[Act, ...]) -> Act:
 
 
 def _meant(act: Act) -> Direction:
-    """Where more of an act without a direction leads."""
+    """Direction of "more" for an act without a direction."""
     slower = act.style in ("relaxed", "gentle", "careful") or act.measure == "under_limit"
     return ("slower" if slower else "faster") if act.act == "speed" else "more"
 
@@ -249,7 +249,7 @@ def _with(before: tuple[Act, ...], k: int, act: Act) -> tuple[Act, ...]:
 
 
 def _reference(act: Act) -> Reference | None:
-    """What an act is about: whom, else where, else what it waits for."""
+    """The first reference of an act: of its target, else its place, else its condition."""
     places = act.place and act.place.ref, act.when and act.when.ref
     return next((one for one in (act.target, *places) if one is not None), None)
 
@@ -287,7 +287,7 @@ def _renamed(reference: Reference, named: Reference) -> Reference:
 
 
 def _undone(before: tuple[Act, ...]) -> list[Act]:
-    """What takes acts back, the last of them first."""
+    """Acts that take others back, the last of them first."""
     if not before:
         return [_UNCLEAR]
     found: list[Act] = []

@@ -37,7 +37,7 @@ WEIGHTS: Final = Path(__file__).parent / "weights"
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """What the parser wrote for a text.
+    """Output of the parser for a text.
 
     Attributes:
         acts: With tokens of `pieces` as pointers.

@@ -41,7 +41,7 @@ _COURTESY: Final = frozenset(_COURTESY_WORDS.split())
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What words mean in a conversation.
+    """Words read in their conversation.
 
     Attributes:
         utterance: Resolved.
@@ -55,13 +55,13 @@ class Turn:
 
     @property
     def cancels(self) -> bool:
-        """Whether the words take something back, and ask for nothing instead."""
+        """True if the words take something back, and ask for nothing instead."""
         verbs = {act.act for act in self.utterance.acts}
         return bool(verbs) and verbs <= {"no", "cancel"}
 
 
 def turn_of(text: str, last: Utterance | None = None) -> Turn:
-    """What words mean after the turn before, and the sentence that says so. Never raises for any text."""
+    """Read words after the turn before, with a whole sentence for them. Never raises."""
     alone, found = _read_after(text, last)
     if not is_elliptical(alone):
         return Turn(found)
@@ -71,7 +71,7 @@ def turn_of(text: str, last: Utterance | None = None) -> Turn:
 
 
 def read(text: str, last: Utterance | None = None, parser: Parser | None = None) -> Utterance:
-    """What a passenger's words mean. Never raises for any text.
+    """Read a passenger's words. Never raises.
 
     Args:
         text: The words as they came; `MOST_CHARS` of them are read.
@@ -82,7 +82,7 @@ def read(text: str, last: Utterance | None = None, parser: Parser | None = None)
 
 
 def _read_after(text: str, last: Utterance | None, parser: Parser | None = None) -> tuple[Utterance, Utterance]:
-    """What words mean by themselves, and after the turn before."""
+    """Readings of words by themselves, and after the turn before."""
     if turns := closed_turn(text):
         alone = Utterance(text, turns, emergency=_stops(text))
         found = resolved(alone, last)
@@ -94,7 +94,7 @@ def _read_after(text: str, last: Utterance | None, parser: Parser | None = None)
 
 @lru_cache(maxsize=16)  # planner, checks and session ask for the words of one wish each
 def _parsed(text: str, parser: Parser | None = None) -> Utterance:
-    """What the parser makes of words by themselves."""
+    """The parser's reading of words by themselves."""
     emergency = _stops(text)
     reads = shipped_parser() if parser is None else parser
     acts: list[Act] = []
@@ -123,7 +123,7 @@ def _parsed(text: str, parser: Parser | None = None) -> Utterance:
 
 
 def _stops(text: str) -> bool:
-    """Whether words call for help or for a stop; "don't stop" calls for none."""
+    """True if words call for help or for a stop; "don't stop" calls for none."""
     found = read_emergency(text)
     return found is not None and found.kind != "no_stop"
 
@@ -148,12 +148,12 @@ def _stretches(text: str) -> list[tuple[int, int, int]]:
 
 
 def _seen(text: str) -> bool:
-    """Whether a text holds anything that the parser's vocabulary does not drop."""
+    """True if a text holds anything that the parser's vocabulary does not drop."""
     return any(unicodedata.category(char)[0] in "LNPS" and char != "\ufffd" for char in text)
 
 
 def _overlap(act: Act, later: Act) -> bool:
-    """Whether an act was read again with more of its words."""
+    """True if an act was read again with more of its words."""
     return act.span is not None and later.span is not None and act.span[1] > later.span[0]
 
 
@@ -181,7 +181,7 @@ _CLAUSES: Final = frozenset({"after", "before", "until", "till", "unless", "when
 
 
 def _before_clause(text: str, low: int, high: int) -> int:
-    """Where an act's own words end, before a clause that nothing was read from."""
+    """End of an act's own words, before a clause that nothing was read from."""
     words = list(_WORD.finditer(text, low, high))
     begins = next((word.start() for word in words[1:] if word[0].lower() in _CLAUSES), high)
     return low + len(text[low:begins].rstrip())

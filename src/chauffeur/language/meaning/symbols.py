@@ -164,7 +164,7 @@ def _reference(reference: Reference | None, names: Iterator[tuple[int, int]]) ->
 
 @dataclass
 class ActGrammar:
-    """What may follow what has been written: give each symbol to `take`, and ask `allowed` before the next."""
+    """The grammar as a state machine: give each symbol to `take`, and ask `allowed` before the next."""
 
     _next: Callable[[], tuple[str, ...]] = field(init=False)
     _field: int = 0

@@ -118,7 +118,7 @@ def closed_turn(text: str) -> tuple[Act, ...]:
 
 
 def answer_in(text: str) -> bool | None:
-    """Whether words say yes (True) or no (False) to what was asked; None where they are something else."""
+    """The answer in words: True for yes, False for no; None if they are something else."""
     said = {act.act for act in _covered(text, _ANSWERS)}
     if said == {"yes"}:
         return True
@@ -126,17 +126,17 @@ def answer_in(text: str) -> bool | None:
 
 
 def takes_back(text: str) -> bool:
-    """Whether words say no to something and nothing else; "don't!" may be meant for what the car does."""
+    """True if words say no to something and nothing else; "don't!" may be meant for what the car does."""
     return bool(said := closed_turn(text)) and all(act.act in ("no", "cancel") for act in said)
 
 
 def cancels(text: str) -> bool:
-    """Whether words take back what was wished ("never mind"), and say nothing else."""
+    """True if words take back what was wished ("never mind"), and say nothing else."""
     return bool(said := closed_turn(text)) and all(act.act == "cancel" for act in said)
 
 
 def _covered(text: str, phrases: Mapping[tuple[str, ...], Act]) -> tuple[Act, ...]:
-    """What the phrases that make up a text stand for, longest first; none where something is left over."""
+    """Acts of the phrases that make up a text, longest first; none if something is left over."""
     words = [word for word in tokens_of(text) if word not in _SIGNS]
     while words and words[0] in _COURTESY:
         words = words[1:]

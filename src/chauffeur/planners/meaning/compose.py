@@ -68,7 +68,7 @@ class Undoable:
 
 @dataclass(frozen=True, slots=True)
 class ComposedActs:
-    """What acts come to.
+    """Acts as a program.
 
     Attributes:
         source, library: The program; empty where nothing can be done.
@@ -110,7 +110,7 @@ class _Composer:
         self._pace = ANY_PACE
         self._referents: dict[Reference, Grounded] = {}
         self._moved_on = False
-        """Whether an act before leads to where other things are in sight."""
+        """True if an act before leads to where other things are in sight."""
         self._turned = False
         self._changed: Side | None = None
         """The side to which lanes were changed last."""
@@ -183,7 +183,7 @@ class _Composer:
             self._pace = held
 
     def _forbidden(self, act: Act) -> Iterator[str]:
-        """What is done where something is not to be done: what else is asked for, or the road is followed."""
+        """Lines for an act that is denied: the other acts, or following the road."""
         if any(not one.negated and one.act in _MOVES_ON | _STANDS for one in self._acts):
             return
         if act.act == "turn" and "straight" in self._situation.turns:
@@ -292,7 +292,7 @@ class _Composer:
             yield f"yield from halt({_STOOD_STEPS})"
 
     def _stand(self, relation: str, reference: Reference) -> str:
-        """Where one stands by a road user: behind, beside or beyond it."""
+        """Side of a road user to stop at: behind, beside or beyond it."""
         agent = self._agent(reference)
         if agent is not None and self._in_our_way(reference):
             return "behind"  # past it nothing leads
@@ -367,7 +367,7 @@ class _Composer:
         yield f"yield from cross_the_junction({pace:g}{f', {beyond:g}' if beyond else ''})"
 
     def _is_told_before_junction(self, act: Act | None) -> bool:
-        """Whether an act is done by a road user that is seen before the next junction."""
+        """True if an act is done by a road user that is seen before the next junction."""
         if act is None or act.act not in _STANDS | {"avoid", "pass"}:
             return False
         users = [one for one in references_of(act) if one.kind in ROAD_USERS]
@@ -537,7 +537,7 @@ class _Composer:
         yield [f"who = yield from look_for({', '.join(words)}, {pace:g})", "if who is None:", "    return"], "who"
 
     def _before_junction(self, target: Target) -> bool:
-        """Whether something lies before the next junction, or behind us."""
+        """True if something lies before the next junction, or behind us."""
         ahead = ground(Reference("junction"), self._seen).fits
         return target.kind == "agent" and bool(ahead) and target.forward_m < ahead[0].forward_m
 
@@ -557,7 +557,7 @@ class _Composer:
         return next((one for one in (*self._seen.others, *self._seen.objects) if one.id == number), None)
 
     def _in_our_way(self, reference: Reference) -> bool:
-        """Whether a road user stands or drives in our own lane."""
+        """True if a road user stands or drives in our own lane."""
         agent, road = self._agent(reference), self._seen.road
         own = road.get(self._seen.ego.lane)
         if agent is None or own is None or agent.kind == "pedestrian":

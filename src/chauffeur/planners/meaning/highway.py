@@ -119,7 +119,7 @@ def steps_of(acts: Sequence[Act], situation: Situation, before: Sequence[Dialect
 
 
 def steps_before(history: History) -> tuple[DialectStep, ...]:
-    """What the most recent remembered trip drove: its own program, or what its words ask for."""
+    """Steps of the most recent remembered trip: of its own program, or of its words."""
     if not history.items:
         return ()
     last = history.items[0]
@@ -191,7 +191,7 @@ class _Speaker:
     # Acts that others change ------------------------------------------------------------------------------------------
 
     def _back(self, act: Act) -> bool:
-        """Whether the way back is part of the step before, which is changed then; a change of lanes has its own."""
+        """True if the way back is part of the step before, which is changed then; a change of lanes has its own."""
         last = self._steps[-1] if self._steps else None
         if last is not None and f"{last.skill}_and_return" in SKILLS:
             self._steps[-1] = replace(last, skill=f"{last.skill}_and_return")
@@ -219,12 +219,12 @@ class _Speaker:
         return replace(act, act="straight") if on else act
 
     def _way_past(self) -> bool:
-        """Whether the step before is a change of lanes that an overtaking begins with."""
+        """True if the step before is a change of lanes that an overtaking begins with."""
         last = self._steps[-1] if self._steps else None
         return last is not None and last in (DialectStep("lane_left"), DialectStep("lane_right"))
 
     def _again(self, act: Act) -> Iterator[DialectStep]:
-        """What was driven before, more or less of it, or to the other side."""
+        """The steps driven before, more or less of them, or to the other side."""
         if not self._before:
             raise _UnclearError(_ASKED["again"])
         for step in self._before:
@@ -270,7 +270,7 @@ class _Speaker:
         return name, number
 
     def _share(self, act: Act) -> float:
-        """What is left, or reached, of a change by a share."""
+        """The factor of a change by a share."""
         assert act.value is not None
         if act.direction is None:
             raise _UnclearError(_ASKED[act.act])
@@ -382,7 +382,7 @@ def _nearest(act: Act, *, patient: bool) -> str | None:
 
 
 def _parts(act: Act) -> frozenset[str]:
-    """What was said of an act, in the notation of `SKILL_ACTS`; without whom it is about."""
+    """Fields of an act in the notation of `SKILL_ACTS`, without its target."""
     fields = {f"{name}:{value}" for name in _FIELDS if (value := getattr(act, name)) is not None}
     marks = [mark for mark, said in (("NOT", act.negated), ("VALUE", act.value is not None)) if said]
     return frozenset({act.act, *fields, *marks})
@@ -394,7 +394,7 @@ def _of_label(label: str) -> frozenset[str]:
 
 
 def _opposed(steps: Sequence[DialectStep]) -> bool:
-    """Whether two steps at once ask for more and for less of the same."""
+    """True if two steps at once ask for more and for less of the same."""
     for one, other in pairwise(steps):
         first, second = one.meaning, other.meaning
         plain = other.wait_s is None and other.condition is None and one.condition is None

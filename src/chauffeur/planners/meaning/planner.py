@@ -143,7 +143,7 @@ def plan_by_sight(request: PlanRequest) -> Plan | None:
 
 
 def _read(request: PlanRequest) -> Utterance:
-    """What the words mean: as they were read in their conversation, else by themselves."""
+    """The meaning of the words in their conversation, else by themselves."""
     instruction, found = request.instruction, request.utterance
     if found is None or found.text not in (instruction.text, instruction.said):
         return read(instruction.text)
@@ -151,7 +151,7 @@ def _read(request: PlanRequest) -> Utterance:
 
 
 def _references(act: Act) -> Iterator[Reference]:
-    """What an act names, and what that belongs to."""
+    """References of an act, and those that they belong to."""
     places = act.place and act.place.ref, act.when and act.when.ref
     for named in (act.target, *places):
         one = named
@@ -167,7 +167,7 @@ def unused_words(utterance: Utterance, undoable: Sequence[Undoable]) -> tuple[st
 
 
 def left_out(undoable: Sequence[Undoable]) -> str:
-    """What of a wish is not done, in words."""
+    """The acts that are not done, in words."""
     return " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in undoable)
 
 

@@ -90,6 +90,6 @@ def choose(
 
 
 def _comes_back(overtaking: Chosen, following: Meaning) -> bool:
-    """Whether a lane wish leads back to where the overtaking began."""
+    """True if a lane wish leads back to where the overtaking began."""
     back = {"overtake.left": "right", "overtake.right": "left"}.get(overtaking.intent)
     return back is not None and following.manoeuvre == "lane" and not following.variant and following.direction == back

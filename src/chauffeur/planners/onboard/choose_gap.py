@@ -140,7 +140,7 @@ def choose_yield(meaning: Meaning, options: Options) -> Chosen | Declined:
 
 
 def _pace(meaning: Meaning) -> dict[str, float]:
-    """How fast a gap may close and open, m/s."""
+    """Rates at which a gap may close and open, m/s."""
     close, opening = {"gentle": (2.0, 2.5), "swift": (8.0, 9.0)}.get(meaning.manner, (6.5, 5.0))
     return {"close_mps": close, "open_mps": opening}
 

@@ -199,7 +199,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class StepCondition:
-    """What a step depends on: `if` is looked at once, `once` is waited for."""
+    """Condition of a step: `if` is looked at once, `once` is waited for."""
 
     how: Literal["if", "once"]
     name: str
@@ -226,7 +226,7 @@ class DialectStep:
 
     @property
     def meaning(self) -> Meaning:
-        """What it means."""
+        """The meaning, with the number."""
         skill = SKILLS[self.skill]
         meaning = replace(skill.meaning, manner=MANNERS.get(self.manner, ""))
         if skill.takes is None or self.number is None or meaning.amount is None:
@@ -275,7 +275,7 @@ def write(steps: Sequence[DialectStep]) -> str:
 
 
 def tell(steps: Sequence[DialectStep]) -> str:
-    """What the program of some steps does, in one sentence: the same numbers in the same units."""
+    """The program of some steps in one sentence: the same numbers in the same units."""
     parts: list[str] = []
     for step in steps:
         skill = SKILLS[step.skill]

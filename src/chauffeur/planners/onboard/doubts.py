@@ -1,4 +1,4 @@
-"""What the embedded planners can do, and which texts are in another language than theirs."""
+"""Abilities of the embedded planners, and recognition of texts in other languages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FOREIGN_WORDS: Final = {
 
 
 def foreign(text: str) -> bool:
-    """Whether a text is in another language than English, but for a word or two."""
+    """True if a text is in another language than English, but for a word or two."""
     letters = [c for c in text if c.isalpha()]
     if not letters:
         return False

@@ -20,7 +20,7 @@ from chauffeur.planners.onboard.thoughts import thoughts_of
 
 @dataclass(frozen=True, slots=True)
 class ReadSteps:
-    """What was read, and what is known of the reading.
+    """A reading as steps, and its provenance.
 
     Attributes:
         wish: The words.
@@ -76,7 +76,7 @@ def linked_here(
 
 
 def drive_alike(some: Sequence[DialectStep], others: Sequence[DialectStep], wish: str, request: PlanRequest) -> bool:
-    """Whether two readings of a wish come to the same drive here: a lane change without a side, where there is one."""
+    """True if two readings of a wish come to the same drive here: a lane change without a side, where there is one."""
 
     def waits(steps: Sequence[DialectStep]) -> list[object]:  # of which linking knows nothing
         return [(step.condition, step.wait_s) for step in steps]
@@ -129,7 +129,7 @@ def plan_of_linked(
 
 
 def alarm_of(read: ReadSteps, *, sure: bool) -> Alarm:
-    """What a reading of words as a stop at once, and nothing else, is: a call to stop, or one that is asked about.
+    """Alarm of a reading that is a stop at once, and nothing else: a call to stop, or distress to ask about.
 
     A stop at a place, at a time to come, or beside words that nothing was read from is a wish like others.
     """

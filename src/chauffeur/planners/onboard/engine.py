@@ -29,7 +29,7 @@ MAX_REPLY_TOKENS: Final = 120
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What the model wrote.
+    """The output of the model.
 
     Attributes:
         text: The reply, up to the end of the program.

@@ -50,7 +50,7 @@ def answer(
     *,
     on_text: OnText | None = None,
 ) -> tuple[OnboardReply, Written]:
-    """What the model says to a wish: steps, a question, or a refusal.
+    """The model's answer to a wish: steps, a question, or a refusal.
 
     Args:
         engine: The model.
@@ -109,11 +109,11 @@ class Settled:
 
     @property
     def steps(self) -> tuple[DialectStep, ...]:
-        """What is to be driven."""
+        """The steps to be driven."""
         return self.read.steps
 
     def question(self, request: PlanRequest) -> str:
-        """What to ask before this is driven; empty where nothing is, or where nobody is there to answer."""
+        """The question before this is driven; empty for none, or if no passenger can answer."""
         unsure = self.left_out or ("" if self.witnessed else UNSURE_WORDS)
         why = unsure or slow_words(self.linked.choice.steps, self.situation, request.limits)
         return unanswered(request.instruction, f"{why} {shall_i(self.steps)}") if why else ""
@@ -195,7 +195,7 @@ class LanguageModelPlanner:
         return plan_of_linked(self, settled.read, settled.linked, settled.used, request, begun)
 
     def settle(self, request: PlanRequest, begun: float, *, shown: bool = True) -> Settled | Plan:
-        """What is to be done here, before it is a policy of some kind; or the plan that declines.
+        """The wish fitted to the road, before it is a policy of some kind; or the plan that declines.
 
         Args:
             request: What is asked.
@@ -241,7 +241,7 @@ class LanguageModelPlanner:
         return Settled(reads, linked, used, situation, written, found.sure, words)
 
     def _steps_of(self, wish: str) -> tuple[DialectStep, ...]:
-        """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""
+        """Steps of an earlier wish, for trips driven by another planner; empty if they are unclear."""
         if wish not in self._read:
             try:
                 self._read[wish] = read_reply(self._engine.write(prompt(None, (), wish), only_program=True).text).steps
@@ -251,5 +251,5 @@ class LanguageModelPlanner:
 
 
 def usage_of(written: Written) -> Usage:
-    """What it cost."""
+    """Tokens of the prompt and the reply."""
     return Usage(prompt_tokens=written.prompt_tokens, completion_tokens=written.tokens)

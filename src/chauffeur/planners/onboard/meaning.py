@@ -1,4 +1,4 @@
-"""What a wish means, as a value: the choice of a program is made on this and never on how similar sentences look.
+"""The meaning of a wish as a value: programs are chosen by it and never by the similarity of sentences.
 
 "Drive faster" and "drive slower" are 0.9 alike to a sentence encoder; here they differ in `change`, which no rule
 may lose on the way.

@@ -1,4 +1,4 @@
-"""What a choice has to go by, and what comes out of it."""
+"""Input and result of a choice."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Chosen:
 
 @dataclass(frozen=True, slots=True)
 class Declined:
-    """Why not, for the person."""
+    """A refusal in words for the person."""
 
     words: str
 

@@ -1,4 +1,4 @@
-"""What earlier trips of the same person say about the numbers the planner chooses by itself.
+"""Preferences from earlier trips for the numbers that the planner chooses by itself.
 
 Only feedback on the same intent counts, the most recent one first: "a bit too fast" after a hurry makes the next hurry
 slower. The offset a trip was driven with is kept in its settings, so that feedback adds up from trip to trip.
@@ -26,7 +26,7 @@ _MAX_HEADWAY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Leaning:
-    """How this person likes an intent, against the planner's defaults.
+    """A person's preference for an intent, relative to the planner's defaults.
 
     Attributes:
         speed_mps: Added to a speed the planner chooses.
@@ -89,7 +89,7 @@ def _moved(leaning: Leaning, feedback: tuple[Feedback, ...], why: str) -> Leanin
 
 
 def because(item: HistoryItem) -> str:
-    """Why a remembered trip counts, a full sentence."""
+    """The reason why a remembered trip counts, a full sentence."""
     said = " ".join(item.feedback[-1].text.split())[:80] if item.feedback else ""
     day = f" on {item.when[:10]}" if item.when else ""
     words = f', you said "{said}"' if said else ""
@@ -97,7 +97,7 @@ def because(item: HistoryItem) -> str:
 
 
 def corrections_of(rounds: Sequence[Round]) -> tuple[Feedback, ...]:
-    """What earlier rounds of the same wish were answered with, as feedback on the numbers."""
+    """Feedback on the numbers from earlier rounds of the same wish."""
     said = (read(one.feedback) for one in rounds)
     return tuple(found for one in said for act in (*one.acts, *one.opinion) if (found := _correction(act)) is not None)
 

@@ -1,4 +1,4 @@
-"""What the on-board model reads and writes, as text: C and H in a few words, the wish, and the reply.
+"""Text that the on-board model reads and writes: C and H in a few words, the wish, and the reply.
 
 The same text is the training data's, the runtime's and, by way of the chat template, that of any server that runs the
 exported model.
@@ -90,7 +90,7 @@ def _item_words(item: HistoryItem, steps_of: Callable[[str], Sequence[DialectSte
 
 
 def feedback_words(feedback: Feedback) -> str:
-    """What was wrong, in the words the model knows; `good` where nothing was."""
+    """Feedback in the words the model knows; `good` if nothing was wrong."""
     bit = "a bit " if feedback.strength < 0.5 else ""
     found: list[str] = []
     if feedback.speed:

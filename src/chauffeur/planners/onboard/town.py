@@ -222,7 +222,7 @@ _GOES_ON: Final = ("straight", "go", "yield", "wait", "turn", "lane")
 
 
 def _kind(step: TownStep) -> str:
-    """What a step does: one of `_KINDS`; empty for what changes nothing."""
+    """Kind of a step: one of `_KINDS`; empty if it changes nothing."""
     if step.waits:
         return "wait"
     if step.out:
@@ -233,7 +233,7 @@ def _kind(step: TownStep) -> str:
 
 
 def _fits(step: TownStep, meant: TownIntent) -> bool:
-    """Whether what was learned of whole sentences says the same as the step."""
+    """True if what was learned of whole sentences says the same as the step."""
     return meant.kind in _KINDS.get(_kind(step), (meant.kind,))
 
 
@@ -249,7 +249,7 @@ def _offered(step: TownStep) -> tuple[str, str]:
 
 
 def _declined(planner: Planner, said: str, meant: TownIntent, situation: Situation, begun: float) -> Plan | None:
-    """What is answered in words; None where something is to be driven."""
+    """The answer in words; None if there is something to drive."""
     if not meant.sure and not (meant.likely and meant.kind == "unsafe"):
         return None
     if meant.kind == "question":  # one clause of it may be answered
@@ -263,7 +263,7 @@ def _declined(planner: Planner, said: str, meant: TownIntent, situation: Situati
 
 
 def _impossible(step: TownStep, situation: Situation) -> str:
-    """Why a step cannot be done where the car is; empty where it can."""
+    """Reason why a step cannot be done from here; empty if it can."""
     if step.place or step.nth > 1 or step.after_m is not None:
         return ""  # the junction that is meant may be another one
     if step.way and situation.turns and step.way not in situation.turns:

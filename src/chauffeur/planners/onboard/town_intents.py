@@ -1,4 +1,4 @@
-"""What a passenger in a town is after: the learned reading of a whole sentence, before any of its parts are read.
+"""Intents in a town: the learned reading of a whole sentence, before any of its parts are read.
 
 A sorter that learned from sentences of many writers (`data/sorters/town.tsv`) says how likely each intent is. It tells
 a story from an instruction, a question from a wish and a hint from small talk; sides, numbers, places and denials are
@@ -51,20 +51,20 @@ class TownIntent:
 
     @property
     def sure(self) -> bool:
-        """Whether it decides alone."""
+        """True if it decides alone."""
         return self.share >= SURE
 
     @property
     def likely(self) -> bool:
-        """Whether it counts beside what the rules read."""
+        """True if it counts beside what the rules read."""
         return self.share >= LIKELY
 
     def surely(self, *kinds: str) -> bool:
-        """Whether it is surely one of some kinds."""
+        """True if it is surely one of some kinds."""
         return self.sure and self.kind in kinds
 
 
 def intent_of(words: str) -> TownIntent:
-    """What words are after. Raises DataError where the sorter is missing."""
+    """The likeliest intent of words. Raises DataError if the sorter is missing."""
     kind, share = next(iter(load_sorter(WEIGHTS).shares(words).items()))
     return TownIntent(kind, share)

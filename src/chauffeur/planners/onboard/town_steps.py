@@ -119,7 +119,7 @@ class TownStep:
 
     @property
     def plain(self) -> bool:
-        """Whether the learned program alone is all there is to it."""
+        """True if the learned program alone is all there is to it."""
         return self.recalled is not None and not (self.place or self.after_m is not None or self.nth > 1)
 
 
@@ -158,7 +158,7 @@ def _parts(text: str) -> list[str]:
 
 
 def _leads(steps: Sequence[TownStep | None]) -> bool:
-    """Whether all but what stands in front is understood: "when I say so, turn left"."""
+    """True if all but what stands in front is understood: "when I say so, turn left"."""
     return steps[-1] is not None and all(step is not None for step in steps[1:])
 
 
@@ -219,7 +219,7 @@ def _recalled(words: str, repository: PolicyRepository, denied: frozenset[str], 
 
 
 def speaks_to_somebody(words: str) -> bool:
-    """Whether words may tell somebody else in the car to stop what they do."""
+    """True if words may tell another passenger to stop something."""
     return _STOPS_SOMEBODY.search(words) is not None
 
 
@@ -248,7 +248,7 @@ def landmarks_in(words: str) -> tuple[str, ...]:
 
 
 def _agrees(words: str, recalled: Recalled, over: bool, denied: frozenset[str]) -> bool:
-    """Whether a learned program goes to the side, and changes lanes, as the words say: likeness alone may not."""
+    """True if a learned program goes to the side, and changes lanes, as the words say: likeness alone may not."""
     said = set(re.findall(r"\w+", words.casefold()))
     sides = {side for side in SIDES if side in said and side not in denied}
     step = TownStep(words, recalled=recalled)

@@ -31,7 +31,7 @@ _PACES: Final = {"style.hurry": "speed.increase", "style.relax": "speed.decrease
 
 @dataclass(frozen=True, slots=True)
 class ReadWish:
-    """What two readers come to.
+    """The decision between two readers.
 
     Attributes:
         steps: What is to be driven or asked about; empty where neither reads anything to do.
@@ -53,7 +53,7 @@ def compared(
     same_here: bool = False,
     refuses: bool = False,
 ) -> ReadWish:
-    """What is to be driven.
+    """Decide between two readings.
 
     Args:
         utterance: What the acts were read from.
@@ -84,7 +84,7 @@ def compared(
 
 
 def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
-    """Whether two programs do the same; how much a "bit" is, how briskly, whether haste is a pace or a style, and
+    """True if two programs do the same; how much a "bit" is, how briskly, whether haste is a pace or a style, and
     whether a lane is to be clear first, which it is in any case, are no difference.
     """
     return (
@@ -115,7 +115,7 @@ def _waits_for(step: DialectStep) -> tuple[str, str] | None:
 
 
 def _is_style(step: DialectStep) -> bool:
-    """Whether it is a pace as a way of driving: it says more than the pace, and what a person likes is kept by it."""
+    """True if it is a pace as a way of driving: it says more than the pace, and what a person likes is kept by it."""
     return step.meaning.family in _PACES
 
 
@@ -124,7 +124,7 @@ def _close(one: Number, other: Number) -> bool:
 
 
 def quoted(text: str, steps: Sequence[DialectStep]) -> bool:
-    """Whether every number of some steps was said, of its own kind or without a unit; shares and counts are said in too
+    """True if every number of some steps was said, of its own kind or without a unit; shares and counts are said in too
     many ways, and a number of an earlier trip was not said now.
     """
     said = read_quantities(text)

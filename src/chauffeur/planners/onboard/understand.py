@@ -16,5 +16,5 @@ NOWHERE: Final = Situation("highway", 25.0, 31.2928, 3, 1, False, None, None)
 
 @lru_cache(maxsize=32)  # a plan and the learned words of a town ask about the same sentence
 def meanings_said(text: str) -> tuple[Meaning, ...]:
-    """What a wish asks for, in order; empty where it is not understood, or asks for nothing. Never raises."""
+    """Meanings of a wish, in order; empty if it is not understood, or asks for nothing. Never raises."""
     return tuple(step.meaning for step in steps_of(read(text).acts, NOWHERE).steps)

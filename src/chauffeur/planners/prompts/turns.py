@@ -33,7 +33,7 @@ class TextPart(TypedDict):
 
 
 class ImageUrl(TypedDict):
-    """Where a picture is; a data URL holds it."""
+    """The place of a picture; a data URL holds it."""
 
     url: str
 
@@ -136,7 +136,7 @@ def words_of(message: Message) -> str:
 
 
 def pictures_in(messages: Sequence[Message]) -> int:
-    """How many pictures a conversation has."""
+    """Number of pictures in a conversation."""
     return sum(
         part["type"] == "image_url"
         for message in messages

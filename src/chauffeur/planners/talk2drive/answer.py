@@ -37,7 +37,7 @@ _FIELDS: Final = frozenset(_Written.model_fields) - {"thoughts"}
 
 @dataclass(frozen=True, slots=True)
 class ParametersAnswer:
-    """What a reply holds: parameters, a refusal, or what is wrong with it.
+    """A reply as parameters, a refusal, or a problem.
 
     Attributes:
         thoughts: R.

@@ -177,7 +177,7 @@ class EmbeddedParameters:
         return undenied(self, question, request, begun, meant=settled.linked.choice.intent)
 
     def _or_asked(self, plan: Plan, hint: Hint, request: PlanRequest, begun: float) -> Plan:
-        """What a hint was taken for, or, where that is not sure, the question whether it is meant."""
+        """The plan for a hint, or, if that is not sure, the question whether it is meant."""
         if plan.policy is None or hint.outright or hint.because or hint.share >= _SURER or hint.kind not in _TAKEN:
             return plan
         question = unanswered(request.instruction, f"{_TAKEN[hint.kind]} Is that right?")
@@ -186,7 +186,7 @@ class EmbeddedParameters:
     def _overrules(
         self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str, outright: Outright
     ) -> bool:
-        """Whether what words hint at counts for more than how they were read."""
+        """True if what words hint at counts for more than how they were read."""
         amounts = measured(wish)
         if hint.kind == "else" or _asks_an_amount(amounts, settled, world):
             return False
@@ -208,7 +208,7 @@ class EmbeddedParameters:
         return hint.share >= (_SURER if plainly else _SURE)
 
     def _as_meant(self, hint: Hint, request: PlanRequest, begun: float) -> Plan:
-        """What a hint is taken for, as a plan."""
+        """The plan for a hint."""
         if hint.kind == "none":
             return declined(self, _NOT_FOR_ME, begun, intent="refuse")
         if place := hint.kind.partition("park.")[2]:
@@ -326,7 +326,7 @@ def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameter
 
 
 def _asks_an_amount(amounts: Sequence[tuple[str, float]], settled: Settled | Plan, world: str) -> bool:
-    """Whether words name a speed, or a distance that may be one to keep: our exit two miles on is none."""
+    """True if words name a speed, or a distance that may be one to keep: our exit two miles on is none."""
     if any(dimension == "speed" for dimension, _ in amounts):
         return True
     if world == "parking" or not any(kind == "distance" and value <= _LONGEST_GAP_M for kind, value in amounts):
@@ -335,12 +335,12 @@ def _asks_an_amount(amounts: Sequence[tuple[str, float]], settled: Settled | Pla
 
 
 def _parks(intent: str) -> bool:
-    """Whether a wish in a lot, read as `intent`, is rather one for a spot: it says nothing of how to drive there."""
+    """True if a wish in a lot, read as `intent`, is rather one for a spot: it says nothing of how to drive there."""
     return not intent.startswith(("speed.", "style.", "stop"))
 
 
 def _forbidden(declined: Plan) -> bool:
-    """Whether it was declined for what it asks for, not for want of understanding."""
+    """True if it was declined for what it asks for, not for want of understanding."""
     return declined.intent == "refuse" and not declined.refusal.startswith(_OFF_TOPIC)
 
 
@@ -382,14 +382,14 @@ def _settings(found: Parameters, situation: Situation, used: Sequence[Leaning]) 
 
 
 def _overruled(history: History, used: Sequence[Leaning]) -> Iterator[str]:
-    """Where what is kept to contradicts what the person said before: both, with their dates."""
+    """Contradictions between the feedback that is followed and earlier feedback, with the dates of both."""
     for conflict in conflicts_in(history):
         if conflict.used.source == "feedback" and any(conflict.used.words in one.because for one in used):
             yield conflict.to_person()
 
 
 def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
-    """What was settled as parameters, or why it is no matter of parameters."""
+    """The settled wish as parameters, or the reason why parameters cannot express it."""
     steps = settled.linked.choice.steps
     if any(_in_time(step) for step in settled.steps):
         return Declined(_AT_ONCE)
@@ -413,7 +413,7 @@ def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
 
 
 def _in_time(step: DialectStep) -> bool:
-    """Whether it is to be done later, or depends on more than a free lane, which the car sees to by itself."""
+    """True if it is to be done later, or depends on more than a free lane, which the car sees to by itself."""
     depends = step.condition is not None and not step.condition.name.startswith("clear_")
     return depends or step.wait_s is not None
 
@@ -424,7 +424,7 @@ def _got_out_at(steps: Sequence[TownStep]) -> str:
 
 
 def _later(steps: Sequence[TownStep]) -> str:
-    """Why steps through a town are no matter of parameters: several, or one for further on. Empty where they are."""
+    """Reason why steps through a town do not fit parameters: several, or one for later. Empty if they do."""
     if len(steps) > 1:
         return _ONE_BY_ONE
     bound = any(step.place or step.nth > 1 or step.after_m is not None or step.before_junction for step in steps)
@@ -441,12 +441,12 @@ def _plain_words(steps: Sequence[TownStep]) -> str:
 
 
 def _sideways(step: Chosen) -> bool:
-    """Whether it leaves the lane, if only for a while."""
+    """True if it leaves the lane, if only for a while."""
     return step.lanes_moved != 0 or step.intent.startswith("overtake")
 
 
 def _one_deed(steps: tuple[Chosen, ...]) -> bool:
-    """Whether it is a change of the lane, faster or slower, which may be done at the same time."""
+    """True if it is a change of the lane, faster or slower, which may be done at the same time."""
     return len(steps) == 2 and steps[0].intent in _PACES
 
 
@@ -480,7 +480,7 @@ _WAY_WORDS: Final = {
 
 
 def does(parameters: Parameters) -> str:
-    """What parameters make the car do, as a clause after "I"."""
+    """The effect of parameters, as a clause after "I"."""
     speed = parameters.target_speed_mps
     pace = "stop" if speed == 0.0 else f"set the target speed to {speed_words(speed)}"
     way = _WAY_WORDS.get(parameters.route, f", take the way to {_the(parameters.route)}") if parameters.route else ""

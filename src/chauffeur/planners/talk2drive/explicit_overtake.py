@@ -1,4 +1,4 @@
-"""Whether somebody says outright that the vehicle ahead is, or is not, to be overtaken.
+"""Outright wishes to overtake the lead vehicle, or not to.
 
 Plain words are not left to likelihoods: who says "don't pass him" is not overtaken with, whatever a sorter thinks of
 the rest of the sentence. All that is not surely a wish (remarks, questions why, conditions) is left to the sorter.
@@ -99,7 +99,7 @@ _UNSURE: Final = re.compile(
 
 
 def told(wish: str) -> Told:
-    """What a wish says outright about the vehicle ahead; empty where it says nothing, or both."""
+    """The outright wish about the lead vehicle; empty if there is none, or both."""
     words = words_of(wish)
     if _LATER.search(words) or _UNSURE.search(words):
         return ""

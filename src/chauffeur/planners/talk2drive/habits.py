@@ -1,4 +1,4 @@
-"""What a person's earlier trips say about parameters: what such a wish means to them, and how fast they like it then.
+"""Evidence of a person's earlier trips for parameters: the meaning of such a wish to them, and the speed they like.
 
 Only words and what was driven are used (H: command, action, evaluation). What was said last of such a wish holds. A
 remark that tells what had been wanted ("I wanted you to pass that car") says what the wish means from then on; a remark
@@ -78,7 +78,7 @@ _SURE: Final = 0.4
 
 @dataclass(frozen=True, slots=True)
 class Meant:
-    """What a person meant on an earlier trip.
+    """The meaning of an earlier trip.
 
     Attributes:
         kind: As a hint is sorted, e.g. `pass`.
@@ -95,7 +95,7 @@ class Meant:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a person likes it.
+    """The speed a person likes.
 
     Attributes:
         share: Of the speed limit.
@@ -109,7 +109,7 @@ class Pace:
 
 
 def meant_before(history: History, world: str) -> tuple[Meant, ...]:
-    """What the recalled trips in a kind of world turned out to mean, the newest first.
+    """Meanings of the recalled trips in a kind of world, the newest first.
 
     Args:
         history: What memory recalled.
@@ -120,7 +120,7 @@ def meant_before(history: History, world: str) -> tuple[Meant, ...]:
 
 
 def kind_of(intent: str, route: str = "") -> str:
-    """What was read and done, as a hint is sorted; empty for what no hint is sorted as.
+    """The kind of hint that an intent corresponds to; empty for none.
 
     Args:
         intent: As the planner tagged it.
@@ -145,7 +145,7 @@ def _meant(item: HistoryItem) -> Meant | None:
 
 
 def _taken_wrongly(done: str, said: Feedback) -> bool:
-    """Whether a plain complaint of the pace says that its change went the wrong way."""
+    """True if a plain complaint of the pace says that its change went the wrong way."""
     return said.strength >= PLAIN and ((done == "slower" and said.speed > 0) or (done == "faster" and said.speed < 0))
 
 

@@ -1,4 +1,4 @@
-"""What somebody is after who does not say so outright: "he is crawling", "my train leaves in ten minutes".
+"""Wishes that are only hinted at: "he is crawling", "my train leaves in ten minutes".
 
 A sorter that was trained on such sentences says how likely each thing is that can be meant where we are; what the
 person meant before on such roads makes the same things likelier (never certain: plain words outweigh any habit).
@@ -70,7 +70,7 @@ or that all is to stay as it is, it has often not understood a hint."""
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """What is likely meant.
+    """The likeliest wish behind a hint.
 
     Attributes:
         kind: One of the world's HINT_KINDS.
@@ -86,7 +86,7 @@ class Hint:
 
 
 def hint_of(wish: str, situation: Situation, history: History, read: str = "") -> Hint | None:
-    """What is likely meant here; None on roads for which nothing was learned.
+    """The likeliest wish behind words here; None on roads for which nothing was learned.
 
     Args:
         wish: The words.
@@ -128,7 +128,7 @@ def _likeliest(shares: Mapping[str, float], world: str) -> tuple[str, float]:
 
 
 def goes_with(read: str, kind: str) -> bool:
-    """Whether words that were read as `read` may stand as they were read where a hint is of a kind: a mood holds what
+    """True if words that were read as `read` may stand as they were read where a hint is of a kind: a mood holds what
     somebody in it is after."""
     return read == kind or (read in _MOODS and kind in _ALIKE[read])
 

@@ -1,4 +1,4 @@
-"""What a mood asks for where nothing was named: past a slower car in a hurry, out of the fast lane at ease.
+"""Lanes and speeds that a mood implies: past a slower car in a hurry, out of the fast lane at ease.
 
 The paper's own example (Sec. V, S) answers "I'm really in a hurry now" behind a slower car with a free lane on the left
 by changing lanes. Whether the lane is free is for the driver to see, who waits until it is.
@@ -42,13 +42,13 @@ def mood_lane(intent: str, situation: Situation) -> Literal[-1, 0, 1]:
 
 
 def follows(situation: Situation) -> bool:
-    """Whether somebody ahead is near enough to be followed."""
+    """True if a lead vehicle is near enough to be followed."""
     front = situation.front
     return front is not None and front.distance_m < max(20.0, _NEAR_S * situation.speed_mps)
 
 
 def held_up(situation: Situation) -> bool:
-    """Whether a slower car is right ahead."""
+    """True if a slower lead vehicle is near."""
     front = situation.front
     return front is not None and follows(situation) and front.speed_mps < _SLOWER_SHARE * situation.speed_limit_mps
 
@@ -137,6 +137,6 @@ def eased_mps(sign: int, situation: Situation, limits: Limits) -> float:
 
 
 def unsaid_turn(wish: str, intent: str) -> bool:
-    """Whether a turn was read into words that name no side."""
+    """True if a turn was read into words that name no side."""
     side = intent.removeprefix("turn.")
     return side in ("left", "right") and intent.startswith("turn.") and side not in wish.lower()

@@ -1,4 +1,4 @@
-"""What words ask for outright, as far as parameters can do it: sides, a pace, a mood, whom to pass.
+"""Outright requests that parameters can do: sides, a pace, a mood, whom to pass.
 
 Read from the acts of the words (`language.meaning`); whatever only may be meant is left to `hints`.
 """
@@ -20,7 +20,7 @@ _PACES: Final = {"faster": 1, "slower": -1, "hurry": 1, "calm": -1}
 
 @dataclass(frozen=True, slots=True)
 class Outright:
-    """What is asked for.
+    """The outright requests of a wish.
 
     Attributes:
         sides: Left and right, as far as named for something to do.
@@ -44,7 +44,7 @@ class Outright:
         return cls(sides, one_sign(map(_pace, acts)), bool(said.acts), said.address == "question" and not said.acts)
 
     def contradicts(self, *, side: str, pace: int) -> bool:
-        """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
+        """True if a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
         return bool(self.sides and side not in self.sides) or (self.pace != 0 and pace not in (0, self.pace))
 
 

@@ -110,7 +110,7 @@ class Talk2DrivePlanner:
         return self._plan(request, answer, prose, usage, begun)
 
     def prompt(self, request: PlanRequest) -> Prompt:
-        """What would be sent first for a request; nobody is asked.
+        """The first prompt for a request, without sending it.
 
         Raises:
             ConfigError: The model behind it does not say.
@@ -144,7 +144,7 @@ def _read(prose: Prose) -> ParametersAnswer:
 
 
 def _findings(answer: ParametersAnswer, request: PlanRequest) -> list[str]:
-    """What the model may mend: an answer that cannot be read, or parameters that road or limits forbid."""
+    """Findings for the model to repair: an unreadable answer, or parameters that road or limits forbid."""
     if answer.parameters is None:
         return [answer.problem] if answer.problem else []
     return policy_findings(answer.parameters, request.context.situation, request.limits)

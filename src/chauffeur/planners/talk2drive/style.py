@@ -1,4 +1,4 @@
-"""How closely the car follows its path: pure pursuit's two numbers for a way of driving.
+"""Pure pursuit's two numbers for a way of driving.
 
 A long look-ahead cuts corners and is smooth, a short one is exact and busy. The paper's example (Eq. 15) is 12 m and
 2.0 s; around it stand a gentler and a livelier pair.
@@ -100,7 +100,7 @@ def named_spot(wish: str) -> str:
 
 
 def place_of(wish: str) -> str:
-    """Which spot of a parking lot a wish means: `stadium`, `exit`, `nearest` or a name; empty where none is."""
+    """The spot of a parking lot that a wish means: `stadium`, `exit`, `nearest` or a name; empty for none."""
     if named := named_spot(wish):
         return named
     if not _PARKS.search(wish):

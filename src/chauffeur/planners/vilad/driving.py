@@ -94,7 +94,7 @@ TIE_M: Final = 2.0
 
 
 def candidates(street: Street) -> tuple[StreetWay | StreetMark | None, ...]:
-    """What pointers point at: nothing, the ways on, the marks."""
+    """Candidates of the pointers: nothing, the ways on, the marks."""
     return (None, *street.ways, *street.marks)
 
 
@@ -139,7 +139,7 @@ def _bend_mps(way: StreetWay) -> float:
 
 
 def marked(street: Street, way: StreetWay, kind: str) -> StreetMark | None:
-    """Which mark of a kind is meant on a way: the first; where one turns, the first after that."""
+    """The mark of a kind that is meant on a way: the first; behind a turn, the first after it."""
     least = -math.inf
     if way.turn != "straight" and way.bend_m is not None and kind != "junction":
         least = way.bend_m[1] - 0.1
@@ -149,7 +149,7 @@ def marked(street: Street, way: StreetWay, kind: str) -> StreetMark | None:
 
 @dataclass(frozen=True, slots=True)
 class DriveGoal:
-    """What a command comes to on a street.
+    """The goal of a command on a street.
 
     Attributes:
         way: Where to drive.
@@ -167,7 +167,7 @@ class DriveGoal:
 
 
 def goal(street: Street, asked: Mapping[str, str]) -> DriveGoal | str:
-    """What a command comes to; in words why not, where there is no such way, no such mark, or no room."""
+    """The goal of a command; the reason in words if there is no such way, no such mark, or no room."""
     turn = asked["turn"]
     ways = {way.turn: way for way in street.ways}
     way = ways.get(turn) if turn != NONE else next((ways[one] for one in TURNS if one in ways), None)
@@ -242,7 +242,7 @@ def _allowed(street: Street, way: StreetWay, wanted_m: float, *, kerb: bool, bac
 
 
 def stations_of(found: Sequence[tuple[Street, Mapping[str, str], DriveGoal]]) -> Array:
-    """Where the car is at each instant, (n, WAYPOINTS), m: up to the pace, slower in bends, down to the goal."""
+    """Stations of the car at each instant, (n, WAYPOINTS), m: up to the pace, slower in bends, down to the goal."""
     at = np.arange(0.0, REACH_M + _GRID_M / 2, _GRID_M)
     stop = np.array([one.stop_m for _, _, one in found])
     start = np.array([street.speed_mps for street, _, _ in found])
@@ -320,7 +320,7 @@ def waypoints_of(values: Mapping[str, str | int]) -> tuple[Array, float]:
 
 
 def fulfils(street: Street, asked: Mapping[str, str], values: Mapping[str, str | int]) -> bool:
-    """Whether an answer is what was asked for: the way, the end within `TIE_M`, at the kerb or not, and the pace.
+    """True if an answer is what was asked for: the way, the end within `TIE_M`, at the kerb or not, and the pace.
 
     Args:
         street: Where.
@@ -342,7 +342,7 @@ _PACE_MPS: Final = 0.9
 
 
 def _same_way(street: Street, one: int, two: int, end_m: float) -> bool:
-    """Whether two ways are one as far as a drive goes."""
+    """True if two ways are one as far as a drive goes."""
     if one == two:
         return True
     if not (1 <= two <= len(street.ways)):
@@ -353,7 +353,7 @@ def _same_way(street: Street, one: int, two: int, end_m: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class DrivingAgreement:
-    """Whether the parts of an answer fit together.
+    """Agreement between the parts of an answer.
 
     Attributes:
         pointers: Way and mark are those of what it says it understood.

@@ -37,7 +37,7 @@ _ALIGN_M: Final = 10.0
 
 
 class WrittenDrive(NamedTuple):
-    """What the network wrote for a command.
+    """The network's answer to a command.
 
     Attributes:
         values: Values of the template's slots, as they are driven.
@@ -133,7 +133,7 @@ _PACED: Final = {"slow": "slowly", "brisk": "briskly"}
 
 
 def understood_in_words(asked: Mapping[str, str]) -> str:
-    """What was understood, as an infinitive: "turn left and stop before the crosswalk"."""
+    """The criteria as an infinitive: "turn left and stop before the crosswalk"."""
     parts = [_TURNED[asked["turn"]]] if asked["turn"] != NONE else []
     if asked["halt"] != NONE:
         said = "pull over to the kerb" if asked["halt"] == "kerb" else "stop"
@@ -166,7 +166,7 @@ def drive_words(street: Street, values: Mapping[str, str | int]) -> str:
 
 
 def refusal_of(street: Street, values: Mapping[str, str | int]) -> str:
-    """Why nothing is driven."""
+    """The reason for driving nothing, a sentence."""
     asked = asked_of_drive(values)
     found = goal(street, asked)
     why = found if isinstance(found, str) else f"I find no way to do that within {REACH_M:.0f} m"

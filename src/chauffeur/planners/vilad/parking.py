@@ -1,4 +1,4 @@
-"""Which free spot is meant: what can be asked of a spot, its features, the pattern of the answer, and what is best.
+"""Choice of a free spot: the criteria, the features of spots, the pattern of the answer, and the optimum.
 
 The answer says first how the words were understood, a token for each thing that can be asked for, and then points at
 the spot. Both are decided by one network in one pattern, so the reasons R and the policy P come from the same pass, and
@@ -144,7 +144,7 @@ def free_spots(lot: ParkingLot, names: Sequence[str] = ()) -> tuple[Spots, tuple
 
 
 def costs_m(spots: Spots, asked: Mapping[str, str]) -> Array:
-    """How bad each spot is, in metres of walking, (n,); infinite where it is not what is asked for.
+    """Cost of each spot in metres of walking, (n,); infinite where it does not fit.
 
     Near and far count the walk, `soon` the drive, `apart` 20 m a neighbour. A kind of bay, cover and the end of a row
     are conditions. Somebody who asks for none of the former gets the spot that is reached first.
@@ -188,7 +188,7 @@ def answer(spots: Spots, asked: Mapping[str, str], candidate: int) -> dict[str, 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Whether the parts of an answer fit together.
+    """Agreement between the parts of an answer.
 
     Attributes:
         row: The named row is that of the spot.
@@ -246,7 +246,7 @@ _KINDS: Final[Mapping[str, str]] = {
 
 
 def in_words(asked: Mapping[str, str]) -> str:
-    """What was understood, as a phrase that follows "a spot"."""
+    """The criteria as a phrase that follows "a spot"."""
     said = [f"near {_SAID[name]}" for name in LANDMARKS if asked[name] == "near"]
     said += [f"far from {_SAID[name]}" for name in LANDMARKS if asked[name] == "far"]
     said += ["away from other cars"] if asked["apart"] == "yes" else []

@@ -193,7 +193,7 @@ class ViladPlanner:
 
 
 def parking_wish(text: str) -> dict[str, str]:
-    """What a wish asks of a parking spot, wherever that may be: the shipped network's reading of it, on no lot."""
+    """Criteria that a wish states for a parking spot: the reading of the shipped network, on no lot."""
     nothing = np.zeros((2, WIDTH), np.float32)
     nothing[0, WIDTH - len(ROWS) - 1] = 1.0
     decided = shipped().decide(TEMPLATE, last_said(text), nothing, HOW)

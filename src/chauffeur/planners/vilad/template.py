@@ -92,12 +92,12 @@ class ActionTemplate:
 
     @cached_property
     def places(self) -> Mapping[str, int]:
-        """Where each slot stands in the sequence."""
+        """Position of each slot in the sequence."""
         return {piece.name: at for at, piece in enumerate(self.pieces) if isinstance(piece, ActionSlot)}
 
     @cached_property
     def maskable(self) -> Array:
-        """Which tokens are actions, the only ones that are ever masked; bool, shape (L,)."""
+        """Mask of the action tokens, the only ones that are ever masked; bool, shape (L,)."""
         return np.array([isinstance(piece, ActionSlot) for piece in self.pieces])
 
     @cached_property
@@ -106,7 +106,7 @@ class ActionTemplate:
         return np.array([MASK if isinstance(piece, ActionSlot) else self.ids[piece] for piece in self.pieces], np.int64)
 
     def allowed(self, candidates: int = 0) -> Array:
-        """Which token may stand where; bool, shape (L, size + candidates)."""
+        """Tokens that may stand at each position; bool, shape (L, size + candidates)."""
         found = np.zeros((self.length, self.size + candidates), np.bool_)
         for at, piece in enumerate(self.pieces):
             if isinstance(piece, str):
@@ -151,7 +151,7 @@ class ActionTemplate:
         }
 
     def validate(self, row: Array | Sequence[int], candidates: int | None = None) -> None:
-        """Whether a sequence is a decision of this template.
+        """Check that a sequence is a decision of this template.
 
         Args:
             row: Token ids.

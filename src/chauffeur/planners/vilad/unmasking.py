@@ -32,7 +32,7 @@ NEVER: Final = -1e9
 
 @dataclass(frozen=True, slots=True)
 class Unmasking:
-    """How tokens are accepted.
+    """The acceptance rule of a decision.
 
     Attributes:
         steps: Sps: the most steps that a decision takes.

@@ -32,7 +32,7 @@ BLIND: Final = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
 
 @dataclass(frozen=True, slots=True)
 class VlmReading:
-    """What the model wrote for a wish and a picture.
+    """Output of the model for a wish and a picture.
 
     Attributes:
         values: Word of each slot of the template.
@@ -83,7 +83,7 @@ class VlmEngine:
 
     @property
     def trusted(self) -> frozenset[str]:
-        """What of a scene it sees well enough to say so: slots that its own tests found right in `TRUST` percent."""
+        """Slots of a scene that it sees well enough to report: its own tests found `TRUST` percent right."""
         tested: Mapping[str, float] = self.about.get("figures", {}).get("test", {})
         return frozenset(name for name in ("grade", "lead", "road") if tested.get(name, 0.0) >= TRUST)
 

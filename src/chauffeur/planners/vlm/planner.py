@@ -55,7 +55,7 @@ _DAMP: Final = ("sunny", "night")
 
 @dataclass(frozen=True, slots=True)
 class _Made:
-    """What became of a wish: the reading that is told of, the gains and by how much they are to this person's taste,
+    """A wish answered: the reading that is told of, the gains and by how much they are to this person's taste,
     the scene and the thoughts."""
 
     read: VlmReading
@@ -122,14 +122,14 @@ class VlmPlanner:
         )
 
     def _blind(self, text: str, given: Mapping[str, str], fault: str) -> _Made:
-        """What is driven without a picture to go by: whatever it would have shown, nothing asks for more care."""
+        """The most careful answer, for a camera that shows nothing."""
         read = self._engine.read(text, None, {**given, "style": "conservative", "weather": "snow", "grade": "heavy"})
         scene = f"{fault}: I cannot see road or weather."
         thoughts = f"{scene} I take my most careful gains until it shows something again."
         return _Made(read, most_careful(), 0.0, scene, thoughts)
 
     def _seeing(self, text: str, given: Mapping[str, str], request: PlanRequest, recall: int) -> _Made:
-        """What is driven by what is seen, said and told. Each source is read for itself, and of all these readings the
+        """The answer by camera, words and weather service. Each source is read for itself, and of all readings the
         one of the most `care` is driven: one more source, whatever it says, never makes the drive less careful."""
         pixels, heard = request.images[-1].pixels(), said_weather(text)
         rest = without_said_weather(text) if heard != "none" else ""
@@ -181,14 +181,14 @@ def _care(made: tuple[ActionMatrix, float]) -> float:
 
 
 def task_of(situation: Situation) -> str:
-    """Which manoeuvre is due, from speed and lanes: standing, to pull away; several lanes, to change; one, to turn."""
+    """The manoeuvre that is due: at a stand, to pull away; with several lanes, to change; with one, to turn."""
     if situation.speed_mps < _STANDS_MPS:
         return "acceleration"
     return "lane_change" if situation.lane_count > 1 else "left_turn"
 
 
 def recalled(history: History) -> int:
-    """What the newest feedback on a similar wish asks for, as an index of `RECALLS`.
+    """The correction by the newest feedback on a similar wish, as an index of `RECALLS`.
 
     What was liked is done again as it was; what was too much or too little moves by one step from how it was.
     """

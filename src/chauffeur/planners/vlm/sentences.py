@@ -1,4 +1,4 @@
-"""What a sentence means, as numbers, and the style of driving that it asks for: a second reader beside the network.
+"""Sentence embeddings, and the style of driving that they ask for: a second reader beside the network.
 
     all-MiniLM-L6-v2 (frozen, int8) --> features --+--> style
     marks of the words (language.sorter) ----------+

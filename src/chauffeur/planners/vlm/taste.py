@@ -1,4 +1,4 @@
-"""What a person's feedback says of how they like to be driven, whatever they wish for (paper Eq. 21-23, H).
+"""A person's taste from feedback on any wish (paper Eq. 21-23, H).
 
 Feedback on nearly the same wish is followed as it stands (`planner.recalled`). Most wishes come in other words, and who
 found one drive too harsh will often find another so. Here all judged drives of a person count, less where wish, style

@@ -1,4 +1,4 @@
-"""What the on-board VLM writes, token by token: the style it heard, what it saw (C), and the action matrix P.
+"""The answer of the on-board VLM, token by token: the style it heard, the scene it saw (C), the action matrix P.
 
     wish | task acceleration, recall none, style aggressive | picture | see snow heavy lead near road straight |
     gains kp=7 ki=12 kd=3 wl=9 wh=11 ws=2

@@ -1,4 +1,4 @@
-"""What the on-board VLM saw and thought, as people read it: C and R from the tokens it wrote."""
+"""C and R of the on-board VLM in words, from the tokens it wrote."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def thought_words(values: Mapping[str, str], where: str = "") -> str:
 
 
 def taste_words(shift: float) -> str:
-    """What a person's earlier feedback moved, to follow R; empty where it moved nothing."""
+    """The effect of a person's earlier feedback, to follow R; empty if there is none."""
     if not shift:
         return ""
     much, how = ("too much", "gentler") if shift > 0.0 else ("too little", "brisker")
