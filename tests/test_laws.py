@@ -184,13 +184,7 @@ READS_WORDS = {
     "planners/arbitration.py": "corrections and denials, until acts of them are read as well",
     **{
         f"planners/onboard/{name}.py": "the rules of a planner that has a reader of its own"
-        for name in (
-            "doubts",
-            "town",
-            "town_intents",
-            "town_steps",
-            "words/files",
-        )
+        for name in ("doubts", "town", "town_intents", "town_steps")
     },
     "planners/talk2drive/embedded.py": "how likely a hint is: acts are what is asked for, not what a remark is after",
     "planners/talk2drive/explicit_overtake.py": "who forbids to pass is read as asking for it too often",
