@@ -27,7 +27,8 @@ SIGNS = (
 )
 BOUNDED = 64
 """A repetition of at most so many counts as bounded."""
-SHORT, TIMES = 1000, 8
+SHORT, TIMES = 2000, 8
+"""Signs, and how many times as many: a square takes over a millisecond of `SHORT` on a fast machine, too."""
 QUICK_S = 0.001
 """Over `SHORT` signs, of a processor's time: what takes no longer is not measured any further."""
 FASTEST_GROWTH = 2.5 * TIMES

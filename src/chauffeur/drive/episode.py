@@ -157,6 +157,7 @@ def run_episode(
     """
     driver = world.driver()
     steers = policy if isinstance(policy, Executor) and not isinstance(policy, DriverLed) else None
+    follows = referee if isinstance(referee, FollowsPolicy) else None  # a protocol's check costs as much as a step
     frames: list[Frame] = []
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
@@ -216,8 +217,8 @@ def run_episode(
             if watch is not None:
                 watch(frame)
         if referee is not None:
-            if isinstance(referee, FollowsPolicy):
-                referee.follow(setpoints, tick.state)
+            if follows is not None:
+                follows.follow(setpoints, tick.state)
             referee.observe()
             if referee.over and failure is None:
                 break
@@ -229,7 +230,7 @@ def run_episode(
                 break
     final = world.observe()
     success = referee is not None and referee.success and failure is None
-    shortfall = referee.shortfall if isinstance(referee, FollowsPolicy) and failure is None else ""
+    shortfall = follows.shortfall if follows is not None and failure is None else ""
     return Episode(
         frames=tuple(frames),
         final=final,

@@ -12,6 +12,7 @@ import operator
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 _LANE_STEPS = {"get_lane_of": 0, "get_left_lane": -1, "get_right_lane": 1}
@@ -63,8 +64,9 @@ class ProgramReading:
     sides_tested: frozenset[int] = frozenset()
 
 
+@lru_cache(maxsize=512)
 def read_program(source: str) -> ProgramReading:
-    """Read a program; nothing is read of text that is not Python, or far too long (`format-v1` refuses both)."""
+    """Read a program, once a text; nothing of text that is not Python, or far too long (`format-v1` refuses both)."""
     if len(source) > _MAX_CHARS:
         return ProgramReading()
     try:

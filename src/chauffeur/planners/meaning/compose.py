@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import Limits, Observation, Situation, VehicleState
+from chauffeur.concept.dialogue import ANSWERS, DIALOGUE
 from chauffeur.concept.sight import AT_KERB_M, states_of
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH
 from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, Side, Utterance, Verb
@@ -48,13 +49,17 @@ _CANNOT: Final[dict[Verb, str]] = {
     "goto": "the place is not in sight; name it alone, and I take you there",
     "move": "I keep to the middle of the lane",
     "refuse": "that is nothing a car does",
+    **dict.fromkeys(DIALOGUE - ANSWERS, "I do not know what that goes back to"),
 }
 _EVENTS: Final = {
     "opens": "I cannot see whether it opens",
     "arrives": "I cannot tell when somebody arrives",
     "told": "say it again when I am to do it",
     "red": "I do not set off on red",
-    **dict.fromkeys(("slower", "closer", "further", "other"), "I do not know how to see that"),
+    "slower": "I do not wait here for another vehicle's speed",
+    "closer": "I do not wait here for a distance",
+    "further": "I do not wait here for a distance",
+    "other": "I do not know how to see that",
 }
 
 
@@ -92,7 +97,7 @@ class ComposedActs:
 
 def compose(utterance: Utterance, observation: Observation, situation: Situation, limits: Limits) -> ComposedActs:
     """A program that does the acts of an utterance one after the other, as far as they can be done from here."""
-    acts = [act for act in utterance.acts if not act.purpose and act.act != "none"]
+    acts = [act for act in utterance.acts if not act.purpose and act.act not in ANSWERS and act.act != "none"]
     return _Composer(acts, observation, situation, limits).composed()
 
 
