@@ -10,6 +10,7 @@ import pytest
 from chauffeur.concept import (
     NOBODY,
     ActionMatrix,
+    ConfigError,
     Context,
     Instruction,
     PlanRequest,
@@ -101,3 +102,5 @@ def test_fixed_gains_are_always_the_same_and_inside_the_box() -> None:
     assert plans[0] == plans[1]
     assert isinstance(plans[0], ActionMatrix)
     assert not gain_box().outside(plans[0])
+    with pytest.raises(ConfigError, match="no variant"):
+        FixedGainsPlanner.from_spec("x")
