@@ -9,18 +9,9 @@ from chauffeur.concept import ChauffeurError
 
 _DEPTH: Final = 5
 _WORDS: Final = (
-    "message",
-    "msg",
-    "detail",
-    "error",
-    "errors",
-    "error_message",
-    "error_description",
-    "title",
-    "reason",
-    "metadata",
+    "message", "msg", "detail", "error", "errors", "error_message", "error_description", "title", "reason", "metadata",
     "raw",
-)
+)  # fmt: skip
 """Fields in which servers say what is wrong: OpenAI's, FastAPI's (`detail`, a list of `msg` and `loc`), RFC 9457's."""
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from string import Template
 
 from chauffeur.concept import Plan, PlanRequest, Program
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.planners.base import no_argument, planned
+from chauffeur.planners.onboard.exemplars.texts import programs
 
 VERSION = "keyword-v1"
 
@@ -47,45 +49,6 @@ _SPEEDS_KMH = {
     "intersection": {"speed.increase": 30.0, "speed.decrease": 15.0, "": 20.0},
 }
 
-_SPEED_PROGRAM = """def drive():
-    # Fixed speed of the rule.
-    set_target_speed({speed:.2f})
-    while True:
-        yield autopilot()
-"""
-_LANE_PROGRAM = """def drive():
-    # One lane to the {side}, when it is free.
-    ego = get_ego_vehicle()
-    set_target_speed({speed:.2f})
-    lane = get_{side}_lane(ego)
-    while not is_safe_enter(lane):
-        yield autopilot()
-    set_target_lane(lane)
-    while True:
-        yield autopilot()
-"""
-_TURN_PROGRAM = """def drive():
-    # Over the junction once the lanes that cross are free.
-    ego = get_ego_vehicle()
-    {api}()
-    set_target_speed({speed:.2f})
-    lanes = get_left_to_right_cross_traffic_lanes() + get_right_to_left_cross_traffic_lanes()
-    while True:
-        if get_speed_of(ego) < 1.0:
-            free = True
-            for lane in lanes:
-                if not is_safe_enter(lane):
-                    free = False
-            if free:
-                recover_from_stop()
-        yield autopilot()
-"""
-_STOP_PROGRAM = """def drive():
-    # Halt and stay.
-    set_target_speed(0.0)
-    while True:
-        yield autopilot()
-"""
 _TURN_APIS = {
     "turn.left": "turn_left_at_next_intersection",
     "turn.right": "turn_right_at_next_intersection",
@@ -138,10 +101,6 @@ def keyword_intent(text: str, world: str) -> tuple[str, str]:
 
 
 def _program(intent: str, speed_mps: float) -> str:
-    if intent in _TURN_APIS:
-        return _TURN_PROGRAM.format(api=_TURN_APIS[intent], speed=speed_mps)
-    if intent.startswith("lane."):
-        return _LANE_PROGRAM.format(side=intent.removeprefix("lane."), speed=speed_mps)
-    if intent == "stop":
-        return _STOP_PROGRAM
-    return _SPEED_PROGRAM.format(speed=speed_mps)
+    kind, _, side = intent.partition(".")
+    text = programs("chauffeur.planners", "keyword")[kind if kind in ("turn", "lane", "stop") else "speed"]
+    return Template(text).substitute(speed=f"{speed_mps:.2f}", side=side, api=_TURN_APIS.get(intent, ""))

@@ -9,11 +9,9 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from chauffeur.planners.onboard.exemplars.texts import sections
+from chauffeur.planners.onboard.exemplars.texts import programs
 
-HELPERS: Final[Mapping[str, str]] = {
-    name: f"{text.rstrip()}\n" for name, text in sections("chauffeur.planners.meaning", "helpers").items()
-}
+HELPERS: Final[Mapping[str, str]] = programs("chauffeur.planners.meaning", "helpers")
 """Source of each by its name; `helpers.lmp` holds them."""
 _WORD: Final = re.compile(r"\w+")
 

@@ -14,7 +14,7 @@ from chauffeur.concept import Limits, Situation
 from chauffeur.planners.onboard.choose import Choice, choose
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, DialectStep
 from chauffeur.planners.onboard.exemplars import function_of
-from chauffeur.planners.onboard.exemplars.texts import sections
+from chauffeur.planners.onboard.exemplars.texts import programs
 from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
@@ -27,7 +27,7 @@ _WAIT = f"""def wait(seconds):
         yield autopilot()
 """
 
-_TESTS = {name: f"{text.rstrip()}\n" for name, text in sections("chauffeur.planners.onboard", "conditions").items()}
+_TESTS = programs("chauffeur.planners.onboard", "conditions")
 """The functions of conditions, by name."""
 assert _TESTS.keys() == CONDITIONS.keys()
 

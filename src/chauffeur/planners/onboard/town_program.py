@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.planners.onboard.exemplars.texts import sections
+from chauffeur.planners.onboard.exemplars.texts import programs
 from chauffeur.planners.onboard.town_steps import LANE_CHANGES, WORDS, TownStep
 
 _STOPS_BEFORE_M: Final = 12.0
@@ -85,8 +85,8 @@ def program_of(steps: Sequence[TownStep], *, said_again: bool = False) -> str:
         "pass_a_way": any(step.nth > 1 for step in steps),
         "drive_on": any(step.after_m is not None for step in steps),
     }
-    texts = sections("chauffeur.planners.onboard", "town")
-    helpers = "".join(f"{texts[name].rstrip()}\n\n\n" for name, needed in used.items() if needed)
+    texts = programs("chauffeur.planners.onboard", "town")
+    helpers = "".join(f"{texts[name]}\n\n" for name, needed in used.items() if needed)
     return "\n".join([helpers, "def as_told():", *body, ""]).lstrip("\n")
 
 

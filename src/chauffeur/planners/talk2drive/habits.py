@@ -32,15 +32,8 @@ _BRISK: Final = ("speed.increase", "speed.max", "style.hurry", "style.sporty", "
 _CALM: Final = ("speed.decrease", "style.relax", "style.comfort", "style.careful", "style.eco", "yield")
 _RANK: Final[dict[Group, int]] = {"calm": 0, "plain": 1, "brisk": 2}
 _EXACT: Final = (
-    "speed.set",
-    "speed.cap",
-    "speed.floor",
-    "speed.limit",
-    "speed.match",
-    "speed.hold",
-    "stop",
-    "pull_over",
-)
+    "speed.set", "speed.cap", "speed.floor", "speed.limit", "speed.match", "speed.hold", "stop", "pull_over",
+)  # fmt: skip
 """What names its own speed, or none."""
 _UNREAD: Final = ("", "ask", "refuse", "unusable")
 

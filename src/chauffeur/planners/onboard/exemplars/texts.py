@@ -26,6 +26,12 @@ def read_texts(package: str, files: tuple[str, ...], helpers: str) -> Mapping[st
 
 
 @cache
+def programs(package: str, file: str) -> Mapping[str, str]:
+    """The programs of an `.lmp` file by name, each with one line end behind it."""
+    return {name: f"{text.rstrip()}\n" for name, text in sections(package, file).items()}
+
+
+@cache
 def sections(package: str, file: str) -> Mapping[str, str]:
     """The texts of an `.lmp` file by name, in its order."""
     text = resources.files(package).joinpath(f"{file}.lmp").read_text(encoding="utf-8")
