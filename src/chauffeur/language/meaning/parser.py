@@ -17,6 +17,7 @@ import numpy as np
 
 from chauffeur.concept import DataError
 from chauffeur.concept.utterance import Address
+from chauffeur.language.exported import open_graph
 from chauffeur.language.meaning.pieces import Pieces, WordPieces, read_vocabulary
 from chauffeur.language.meaning.symbols import (
     END,
@@ -57,14 +58,9 @@ class Parser:
 
     def __init__(self, folder: Path = WEIGHTS, threads: int = 1) -> None:
         """Args: where its files lie; threads of a pass. Raises DataError: a file is missing or damaged."""
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
         try:
-            self._encoder: Any = onnxruntime.InferenceSession(folder / ENCODER, options, ["CPUExecutionProvider"])
-            self._decoder: Any = onnxruntime.InferenceSession(folder / DECODER, options, ["CPUExecutionProvider"])
+            self._encoder: Any = open_graph(folder / ENCODER, threads)
+            self._decoder: Any = open_graph(folder / DECODER, threads)
             self._pieces = WordPieces(read_vocabulary(folder / PIECES))
         except Exception as error:  # the runtime raises types of its own for a damaged graph
             raise DataError(

@@ -17,7 +17,7 @@ import llguidance
 import numpy as np
 
 from chauffeur.concept import DataError
-from chauffeur.planners.exported import open_exported
+from chauffeur.language.exported import open_exported
 from chauffeur.planners.onboard.prompt import END
 from chauffeur.planners.onboard.reply import grammar
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import DataError
-from chauffeur.planners.exported import open_exported
+from chauffeur.language.exported import open_exported
 from chauffeur.planners.vilad.template import ActionTemplate
 from chauffeur.planners.vilad.unmasking import Decided, Predict, Unmasking, unmask, unmasking
 from chauffeur.planners.word_table import SHIPPED_WORDS, WordTable, load_words

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import ActionMatrix, DataError
+from chauffeur.language.exported import open_exported
 from chauffeur.language.text_classifier import load_sorter
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
-from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vlm.sentences import load_head, shipped_encoder
 from chauffeur.planners.vlm.template import DECIDED, GRADES, STYLES, TEMPLATE, GainCodebook
 from chauffeur.planners.word_table import SHIPPED_WORDS, WordTable, load_words

@@ -17,7 +17,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from chauffeur.concept import DataError
-from chauffeur.planners.exported import open_graph
+from chauffeur.language.exported import open_graph
 from chauffeur.planners.word_table import SHIPPED_WORDS, load_words
 
 Array = np.ndarray[Any, Any]

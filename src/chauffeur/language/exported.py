@@ -1,4 +1,4 @@
-"""Our exported networks, opened with ONNX Runtime: no training library on board."""
+"""Opens our exported networks with ONNX Runtime: no training library on board."""
 
 from __future__ import annotations
 
