@@ -105,7 +105,7 @@ def _at_a_crossing(frames: Sequence[Frame], final: Observation, other: int) -> B
     if begun < len(frames):
         stood = frames[begun].observation
         found = next((car for car in (*stood.others, *stood.objects) if car.id == other), None)
-        if found is not None and not _in_the_way(final.ego, found):
+        if found is not None and not in_the_way(final.ego, found):
             return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
     return Blame("ego", other, None, "The ego was in the way of one that crossed.")
 
@@ -124,7 +124,7 @@ def _reversed(observation: Observation, other: int) -> bool:
     return math.cos(car.heading_rad) * (ego.x_m - car.x_m) + math.sin(car.heading_rad) * (ego.y_m - car.y_m) < 0.0
 
 
-def _in_the_way(ego: VehicleState, other: VehicleState) -> bool:
+def in_the_way(ego: VehicleState, other: VehicleState) -> bool:
     """Whether the ego's body is in the strip that another covers if it goes straight on."""
     c, s = math.cos(other.heading_rad), math.sin(other.heading_rad)
     across = -s * (ego.x_m - other.x_m) + c * (ego.y_m - other.y_m)

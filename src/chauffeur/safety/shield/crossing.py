@@ -62,17 +62,17 @@ class _Care:
     followers: bool = False
 
 
-_DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
+DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
 """What every command has to leave; a body has its lane, and half a metre that corners are cut by."""
-_KIND: Final = replace(_DUE, followers=True)
+KIND: Final = replace(DUE, followers=True)
 """The same, and who follows in the ego's stream could still stop behind it. That can be the follower's own doing."""
 _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=2.0)
 """The same for a car that got off its way: it needs room to get back to it."""
-_LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
+LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
 """What is left where that is gone, because others or tyres did what was not foreseen."""
-_STAYING: Final = replace(_LAST, room_m=_DUE.room_m)
+_STAYING: Final = replace(LAST, room_m=DUE.room_m)
 """The same on the road."""
-_BESIDE: Final = replace(_LAST, side_m=0.05)
+_BESIDE: Final = replace(LAST, side_m=0.05)
 """To stand beside somebody's way without touching it."""
 
 
@@ -176,10 +176,10 @@ class Junction:
             most_mps2: Hardest acceleration that they would.
             held_up: Whether a lead is so close that it has to brake for it.
         """
-        outlook = self._outlook(observation, around, lane)
-        ways = self._candidates(lane, aim, outlook.state)
+        outlook = self.outlook(observation, around, lane)
+        ways = self.candidates(lane, aim, outlook.state)
         followed = rollout.followed(outlook.state, outlook.others)
-        cares = (_KIND, _DUE) if followed else (_DUE,)
+        cares = (KIND, DUE) if followed else (DUE,)
         tries = (_mend(outlook, ways, command, most_mps2, care, held_up=held_up) for care in cares)
         found = next((one for one in tries if one is not None), None)
         if found is not None:
@@ -190,16 +190,16 @@ class Junction:
         self._motion.commanded(observation, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, observation: Observation, around: TrafficArrays, lane: LaneId) -> _Outlook:
+    def outlook(self, observation: Observation, around: TrafficArrays, lane: LaneId) -> Outlook:
         ego, line_of = observation.ego, self._line_of
         on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
         others = rollout.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
-        return _Outlook(
-            self._motion.observe(observation), size, others, self._keep_clear(lane), self._table, self._dt_s
+        return Outlook(
+            self._motion.observe(observation), size, others, self.keep_clear(lane), self._table, self._dt_s
         )
 
-    def _keep_clear(self, lane: LaneId) -> Array:
+    def keep_clear(self, lane: LaneId) -> Array:
         """The straight lanes nobody may stand in who is in a lane, as `rollout` wants them.
 
         Who is to come along its own lane, the one before it, or one that forks off where it does, comes from behind.
@@ -215,10 +215,10 @@ class Junction:
             self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(len(rows), 5)
         return self._clear_from[lane]
 
-    def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
+    def candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
         """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
-        ways = self._ways_from(lane, aim if aim in self.road[lane].successors else None)
-        if self._promised is None or any(_along(way, state) for way in ways):
+        ways = self.ways_from(lane, aim if aim in self.road[lane].successors else None)
+        if self._promised is None or any(runs_along(way, state) for way in ways):
             return ways
         return [self._promised]
 
@@ -226,7 +226,7 @@ class Junction:
         """What follows a lane: each lane that begins where it ends, or nothing."""
         return [(one,) for one in self.road.successors(lane.id)] or [()]
 
-    def _ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
+    def ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
         """Ways on from a lane, through what follows it or only `onto` one lane: rows of (x, y, heading)."""
         if (lane, onto) not in self._ways:
             own = self.road[lane]
@@ -264,7 +264,7 @@ def _turned(way: Array) -> float:
     return float(np.abs(np.diff(np.unwrap(way[:, 2]))).sum())
 
 
-def _along(way: Array, state: Array) -> bool:
+def runs_along(way: Array, state: Array) -> bool:
     at = rollout.nearest(way, state[0], state[1], -1)
     return abs(wrap_to_pi(float(way[at, 2] - state[2]))) < _AWAY_RAD
 
@@ -274,7 +274,7 @@ _Asked = tuple[float, float, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class _Outlook:
+class Outlook:
     """An instant, ready to be rolled on."""
 
     state: Array
@@ -301,7 +301,7 @@ class _Outlook:
         beyond = last + math.ceil(self.size[0] / rollout.STEP_M)
         return _Way(at, beyond, hold - self.table.margin_m)
 
-    def trouble_s(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+    def trouble_s(self, command: Command, points: Array, plan: Manoeuvre, care: _Care) -> float:
         """Time until a plan after a command on a way ends badly; infinite if it ends well."""
         asked = command.acceleration_mps2, command.steering_rad, id(points), id(plan), id(care)
         found = self._troubles.get(asked)
@@ -309,7 +309,7 @@ class _Outlook:
             found = self._troubles[asked] = self._foreseen(command, points, plan, care)
         return found
 
-    def _foreseen(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+    def _foreseen(self, command: Command, points: Array, plan: Manoeuvre, care: _Care) -> float:
         table, way = self.table, self.way(points)
         stops = plan.mps2 < 0.0
         return rollout.rollout(
@@ -344,13 +344,13 @@ class _Outlook:
 
     def stops(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way on which the car can still stop after a command."""
-        return next((way for way in ways if self._ends_well(command, way, _STOPS, care)), None)
+        return next((way for way in ways if self._ends_well(command, way, STOPS, care)), None)
 
     def clears(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way, if on each of them the crossing can be cleared after a command: any may be taken."""
-        return ways[0] if all(self._ends_well(command, way, _CLEARS, care) for way in ways) else None
+        return ways[0] if all(self._ends_well(command, way, CLEARS, care) for way in ways) else None
 
-    def _ends_well(self, command: Command, way: Array, plans: Sequence[_Plan], care: _Care) -> bool:
+    def _ends_well(self, command: Command, way: Array, plans: Sequence[Manoeuvre], care: _Care) -> bool:
         return any(self.trouble_s(command, way, plan, care) == math.inf for plan in plans)
 
     def wheel_rad(self, law: int, points: Array, acceleration_mps2: float) -> float:
@@ -363,7 +363,7 @@ class _Outlook:
 
     def stays_s(self, command: Command, way: Array) -> float:
         """Time for which a plan to clear the crossing after a command keeps the car no farther off its way than now."""
-        return max(self.trouble_s(command, way, plan, _DUE) for plan in _CLEARS)
+        return max(self.trouble_s(command, way, plan, DUE) for plan in CLEARS)
 
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
@@ -376,20 +376,20 @@ class _Outlook:
 
 
 @dataclass(frozen=True, slots=True)
-class _Plan:
+class Manoeuvre:
     mps2: float
     law: int
 
 
-_STOPS: Final = tuple(_Plan(-8.0, law) for law in (0, 1, 2))
-_CLEARS: Final = tuple(_Plan(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
+STOPS: Final = tuple(Manoeuvre(-8.0, law) for law in (0, 1, 2))
+CLEARS: Final = tuple(Manoeuvre(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
 _YIELDS: Final = "Somebody crosses ahead, and goes first."
 _CLEARS_WHY: Final = "Somebody is coming: the crossing has to be cleared."
 _STRAYS: Final = "The car would leave its way, or get into that of somebody who crosses."
 
 
 def _mend(
-    outlook: _Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
+    outlook: Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
 ) -> tuple[CrossingResult, Array] | None:
     """The command with its acceleration mended, if that is enough, and the way that is then promised."""
     asked, steering = command.acceleration_mps2, command.steering_rad
@@ -415,13 +415,13 @@ def _mend(
     return None
 
 
-def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -> CrossingResult:
+def _rescue(outlook: Outlook, way: Array, command: Command, most_mps2: float) -> CrossingResult:
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
     clearing = outlook.clearing_mps2(most_mps2)
-    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _DUE.room_m
-    for care in (_DUE, _LOST):
+    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > DUE.room_m
+    for care in (DUE, _LOST):
         # To stop comes first: the way that was promised need not be the one that is wanted. A car that is off its way,
         # or is going to be, brakes before anything: at the speed that was asked for it gets farther off.
         off = strayed or care is _LOST
@@ -444,11 +444,11 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
     begun = [
         (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)
-        for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing))
+        for acceleration, plans in ((least, STOPS), *((mps2, CLEARS) for mps2 in clearing))
         for law in range(rollout.LAWS)
     ]
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
-    troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
+    troubles = [outlook.trouble_s(trial, way, plan, LAST) for trial, plan in trials]
     latest = max(troubles)
     # Of those that keep clear of others as long, the one longest on its way: a light hand may be too light.
     tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]

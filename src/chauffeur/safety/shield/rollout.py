@@ -64,7 +64,8 @@ _AHEAD_M = 45.0
 _BESIDE_M = 2.0
 _IN_STREAM_M = 1.5
 _SLACK = 1e-3
-_MINDED, _FOLLOWS, _PAST = 1, 2, 0
+MINDED, FOLLOWS, PAST = 1, 2, 0
+"""How another is taken: as one that crosses, as one that follows in the ego's stream, as one that is past."""
 _LOOSE_M = 1.5
 
 
@@ -199,15 +200,15 @@ def reach_m(speed: float, time_s: float, acceleration: float) -> float:
 
 
 @compiled
-def _following_m(speed: float, time_s: float, acceleration: float, response_s: float, braking: float) -> float:
+def following_m(speed: float, time_s: float, acceleration: float, response_s: float, braking: float) -> float:
     """How far one who follows gets at most, if it responds in time (RSS)."""
     blind = min(time_s, response_s)
     then = speed + acceleration * blind
-    return (speed + then) / 2.0 * blind + _least_m(then, time_s - blind, braking)
+    return (speed + then) / 2.0 * blind + least_m(then, time_s - blind, braking)
 
 
 @compiled
-def _least_m(speed: float, time_s: float, braking: float) -> float:
+def least_m(speed: float, time_s: float, braking: float) -> float:
     """How far another gets at least."""
     braked = min(time_s, speed / braking)
     return (speed - 0.5 * braking * braked) * braked
@@ -312,7 +313,7 @@ def followed(state: Array, others: Array) -> bool:
 
 
 @compiled
-def _met(
+def met(
     state: Array,
     size: tuple[float, float],
     time_s: float,
@@ -328,7 +329,7 @@ def _met(
     acceleration, braking, response_s, sure_braking = of_others
     ch, sh = math.cos(state[2]), math.sin(state[2])
     for j in range(len(others)):
-        if minded[j] == _PAST:
+        if minded[j] == PAST:
             continue
         c, s = others[j, 2], others[j, 3]
         dx, dy = state[0] - others[j, 0], state[1] - others[j, 1]
@@ -339,12 +340,12 @@ def _met(
             continue
         long = abs(cosine) * size[0] + sine * size[1]
         speed = others[j, 4]
-        if along + long + _BEHIND_M <= _least_m(speed, time_s, braking) - others[j, 5]:
+        if along + long + _BEHIND_M <= least_m(speed, time_s, braking) - others[j, 5]:
             continue
         if cosine > _ALIGNED and along <= 0.0:
             continue  # a lead: the gap to it is kept elsewhere
-        if minded[j] == _FOLLOWS:
-            if along - long - others[j, 5] < _following_m(speed, time_s, acceleration, response_s, sure_braking):
+        if minded[j] == FOLLOWS:
+            if along - long - others[j, 5] < following_m(speed, time_s, acceleration, response_s, sure_braking):
                 return True
             continue
         joined = _joined(cosine, across)
@@ -352,12 +353,12 @@ def _met(
         if along - long - others[j, 5] < reach_m(speed, left_s, acceleration):
             return True
         if joined:
-            minded[j] = _PAST
+            minded[j] = PAST
     return False
 
 
 @compiled
-def _in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: float) -> bool:
+def in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: float) -> bool:
     """Whether the ego's body is in a lane other than its own, or in the way of it: nobody may be there yet."""
     ch, sh = math.cos(state[2]), math.sin(state[2])
     for k in range(len(lanes)):
@@ -433,10 +434,10 @@ def rollout(
         dt_s, periods: Control period, and how many are looked at.
     """
     state = start.copy()
-    minded = np.full(len(others), _MINDED)
+    minded = np.full(len(others), MINDED)
     for j in range(len(others)):
         if _followed_by(state, others[j]):
-            minded[j] = _FOLLOWS if followers else _PAST
+            minded[j] = FOLLOWS if followers else PAST
     i = at
     along, across = _local(way, i, state[0], state[1])
     off = abs(_wrapped(state[2] - way[i, 2]))
@@ -467,9 +468,9 @@ def rollout(
             off = abs(_wrapped(state[2] - way[i, 2]))
             if off > turn or _beside_m(across, off, size) > room:
                 return time_s, LEFT
-            if standing and _in_a_lane(state, size, lanes, side_m):
+            if standing and in_a_lane(state, size, lanes, side_m):
                 return time_s, MET
-            if _met(state, size, time_s, standing, others, minded, side_m, after_s, merge_s, of_others):
+            if met(state, size, time_s, standing, others, minded, side_m, after_s, merge_s, of_others):
                 return time_s, MET
         if standing or (i > beyond and then_mps2 > 0.0 and period >= _SETTLING):
             return math.inf, NONE
