@@ -117,6 +117,9 @@ CASES: dict[str, tuple[list[bytes], Mapping[str, Any], Findings]] = {
     "sealed with another key": (
         chain(UNDER_KEY, WISH, key=OTHER_KEY), {"key": KEY}, [(1, "seal_wrong"), (2, "seal_wrong")],
     ),
+    "sealed with half a letter": (
+        [changed(SEALED[0], mac="\ud800"), *SEALED[1:]], {"key": KEY}, [(1, "changed"), (1, "seal_wrong")],
+    ),
     "sealed with another key, none given": (chain(UNDER_KEY, WISH, key=OTHER_KEY), {}, []),
     "without seals": (chain(UNDER_KEY, WISH), {"key": KEY}, [(1, "seal_missing"), (2, "seal_missing")]),
     "without seals, no key given": (chain(UNDER_KEY, WISH), {}, [(1, "seal_missing"), (2, "seal_missing")]),

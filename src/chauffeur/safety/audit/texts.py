@@ -9,13 +9,13 @@ neither text nor digest: a digest of a short wish that anybody can compute would
 from __future__ import annotations
 
 import hashlib
-import hmac
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from chauffeur.safety.audit.entries import AuditRecord
 from chauffeur.safety.audit.findings import TEXT_CODES, TextCode
+from chauffeur.safety.audit.keys import is_sealed, sealed
 
 SALT_BYTES: Final = 16
 
@@ -63,7 +63,9 @@ def hide(
             continue
         salt = make_salt(SALT_BYTES)
         form: Form = "hmac" if private else "text"
-        value = _text_mac(key, salt, text) if private and key is not None else text
+        value = text
+        if private and key is not None:
+            value = sealed(key, _HMAC_PURPOSE, salt + text.encode(errors="surrogatepass"))
         references[name] = {"digest": _digest(salt, form, value)}
         values[name] = {"salt": salt.hex(), form: value}
     return references, values
@@ -95,7 +97,8 @@ def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) ->
         return value["text"] == text
     if key is None:
         return None
-    return hmac.compare_digest(str(value["hmac"]), _text_mac(key, bytes.fromhex(str(value["salt"])), text))
+    salt = bytes.fromhex(str(value["salt"]))
+    return is_sealed(str(value["hmac"]), key, _HMAC_PURPOSE, salt + text.encode(errors="surrogatepass"))
 
 
 def erased(record: AuditRecord) -> dict[str, dict[str, Any]]:
@@ -134,7 +137,3 @@ def _references(record: AuditRecord) -> dict[str, Any]:
 
 def _digest(salt: bytes, form: Form, value: str) -> str:
     return hashlib.sha256(salt + form.encode() + b"\0" + value.encode(errors="surrogatepass")).hexdigest()
-
-
-def _text_mac(key: bytes, salt: bytes, text: str) -> str:
-    return hmac.new(key, _HMAC_PURPOSE + salt + text.encode(errors="surrogatepass"), hashlib.sha256).hexdigest()

@@ -195,9 +195,7 @@ class Junction:
         on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
         others = rollout.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
-        return Outlook(
-            self._motion.observe(observation), size, others, self.keep_clear(lane), self._table, self._dt_s
-        )
+        return Outlook(self._motion.observe(observation), size, others, self.keep_clear(lane), self._table, self._dt_s)
 
     def keep_clear(self, lane: LaneId) -> Array:
         """The straight lanes nobody may stand in who is in a lane, as `rollout` wants them.
