@@ -23,6 +23,7 @@ from chauffeur.concept import Command, Lane, LaneId, Observation, VehicleState
 from chauffeur.geometry import RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import rollout
 from chauffeur.safety.shield.frame import CROSSING_RAD
+from chauffeur.safety.shield.gaps import highest
 from chauffeur.safety.shield.table import ShieldParameters
 from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 
@@ -294,8 +295,7 @@ class Outlook:
 
     def _seen(self, points: Array) -> _Way:
         at = rollout.nearest(points, self.state[0], self.state[1], -1)
-        first, last, hold = rollout.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
-        del first
+        _, last, hold = rollout.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
         beyond = last + math.ceil(self.size[0] / rollout.STEP_M)
         return _Way(at, beyond, hold - self.table.margin_m)
 
@@ -309,36 +309,17 @@ class Outlook:
 
     def _foreseen(self, command: Command, points: Array, plan: Manoeuvre, care: _Care) -> float:
         table, way = self.table, self.way(points)
-        stops = plan.mps2 < 0.0
+        asked = command.acceleration_mps2, command.steering_rad
+        of_others = (
+            table.others_acceleration_mps2, table.others_braking_mps2, table.others_response_s,
+            table.others_sure_braking_mps2,
+        )  # fmt: skip
+        periods = round((_STOP_S if plan.mps2 < 0.0 else _CLEAR_S) / self.dt_s)
         return rollout.rollout(
-            self.state,
-            (command.acceleration_mps2, command.steering_rad),
-            plan.mps2,
-            _CLEARING_MPS,
-            plan.law,
-            points,
-            way.at,
-            way.beyond,
-            way.hold_m,
-            self.size,
-            self.others,
-            self.lanes,
-            care.room_m,
-            care.turn_rad,
-            care.side_m,
-            care.after_s,
-            care.merge_s,
-            care.followers,
-            (
-                table.others_acceleration_mps2,
-                table.others_braking_mps2,
-                table.others_response_s,
-                table.others_sure_braking_mps2,
-            ),
-            table.braking_mps2,
-            self.dt_s,
-            round((_STOP_S if stops else _CLEAR_S) / self.dt_s),
-        )[0]
+            self.state, asked, plan.mps2, _CLEARING_MPS, plan.law, points, way.at, way.beyond, way.hold_m, self.size,
+            self.others, self.lanes, care.room_m, care.turn_rad, care.side_m, care.after_s, care.merge_s,
+            care.followers, of_others, table.braking_mps2, self.dt_s, periods,
+        )[0]  # fmt: skip
 
     def stops(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way on which the car can still stop after a command."""
@@ -396,16 +377,14 @@ def _mend(
         way = outlook.clears(command, ways, care)
     if way is not None:
         return CrossingResult(command), way
-    low, high = outlook.least_mps2, asked
-    way = outlook.stops(Command(low, steering), ways, care) if low < high else None
+    low = outlook.least_mps2
+    way = outlook.stops(Command(low, steering), ways, care) if low < asked else None
     if way is not None:
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            if outlook.stops(Command(middle, steering), [way], care) is not None:
-                low = middle
-            else:
-                high = middle
-        return CrossingResult(Command(low, steering), "yield", _YIELDS), way
+        kept = [way]
+        found = highest(
+            low, asked, lambda one: outlook.stops(Command(one, steering), kept, care) is not None, _HALVINGS
+        )
+        return CrossingResult(Command(found, steering), "yield", _YIELDS), way
     for clearing in outlook.clearing_mps2(most_mps2):
         way = outlook.clears(Command(clearing, steering), ways, care) if asked < clearing else None
         if way is not None:

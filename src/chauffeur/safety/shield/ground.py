@@ -31,7 +31,6 @@ class GroundShield(Shield):
     ) -> None:
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
-        self._most = Limits() if limits is None else limits
         ground = Ground(RoadGraph((), paved=(world.ground,)))
         self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate, ground)
         self._limit = limit_mps
@@ -41,7 +40,7 @@ class GroundShield(Shield):
         del aim
         lane = observation.ego.lane
         sign = LIMIT_MPS if self._limit is None or lane is None else self._limit(lane)
-        ruling = self._lot_filter.filter(observation, command, self._most.most_mps(sign))
+        ruling = self._lot_filter.filter(observation, command, self._limits.most_mps(sign))
         if not ruling.rule:
             return FilterResult(ruling.command)
         return FilterResult(ruling.command, (Intervention(ruling.rule, ruling.reason, command, ruling.command),))

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
 from chauffeur.geometry import RoadGraph
@@ -31,6 +32,8 @@ from chauffeur.safety.words import speed_words
 Span = tuple[float, float]
 """(lowest, highest) place across the road, m from the centre of the ego's lane."""
 
+UNKNOWN: Final = "Where somebody is cannot be told."
+NO_NUMBER: Final = "A command that is no number was replaced."
 _CORNER_M = 0.5
 _CREEP_M = 1e-3
 """What counts as further over a line than the body is: any more, or it could creep there period by period."""
@@ -54,6 +57,11 @@ class FilterResult:
 
     command: Command
     interventions: tuple[Intervention, ...] = ()
+
+    @classmethod
+    def replaced(cls, command: Command, safe: Command, reason: str) -> FilterResult:
+        """A command that could not be judged, with what goes in its place."""
+        return cls(safe, (Intervention("finite", reason, command, safe),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +108,9 @@ class Shield:
         around = TrafficArrays.of(observation)
         line_m = self._stop_lines.ahead_m(observation) if observation.objects and around.known else math.inf
         scene = self._lens.look(observation, observation.ego.lane, around) if _known(observation.ego) else None
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
+        if not (is_finite(command) and around.known):
             safe = self._standing_still(observation, scene)
-            return FilterResult(
-                safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),)
-            )
-        if not around.known:
-            safe = self._standing_still(observation, scene)
-            return FilterResult(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
+            return FilterResult.replaced(command, safe, UNKNOWN if is_finite(command) else NO_NUMBER)
         if scene is None:
             return FilterResult(command)
         crossings = bool(observation.road.junctions)
@@ -317,6 +320,11 @@ class Shield:
             if gap < needed:
                 return -table.gentle_mps2
         return wanted
+
+
+def is_finite(command: Command) -> bool:
+    """Whether both numbers of a command are numbers."""
+    return math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)
 
 
 def _known(vehicle: VehicleState) -> bool:

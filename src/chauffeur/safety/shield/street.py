@@ -27,9 +27,10 @@ from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle, c
 from chauffeur.geometry import Polyline, Pose, RoadGraph, Route, joined, wrap_to_pi
 from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield import failsafe
-from chauffeur.safety.shield.gaps import rss_gap_m
-from chauffeur.safety.shield.shield import FilterResult, Shield
+from chauffeur.safety.shield.gaps import highest, rss_gap_m
+from chauffeur.safety.shield.shield import NO_NUMBER, UNKNOWN, FilterResult, Shield, is_finite
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
+from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 from chauffeur.safety.words import speed_words
 from chauffeur.worlds.town.way import astride_m, most_mps
 
@@ -141,7 +142,7 @@ class StreetShield(Shield):
         car: KinematicBicycle = LINCOLN_MKZ,
     ) -> None:
         super().__init__(dt_s, limits, parameters)
-        self._period_s, self._most, self._bounds, self._car = dt_s, limits or Limits(), parameters, car
+        self._car = car
         self._numbers = failsafe.numbers(car)
         self._ways: dict[tuple[LaneId, ...], _Way] = {}
         self._road: RoadGraph | None = None
@@ -160,10 +161,10 @@ class StreetShield(Shield):
     def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
         """The command, changed as little as needed; arguments as of `Shield.guard`."""
         ego = observation.ego
-        if not _known(ego) or not all(map(_known, (*observation.others, *observation.objects))):
-            return _replaced(command, self._halt(ego), "finite", "Where somebody is cannot be told.")
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            return _replaced(command, self._halt(ego), "finite", "A command that is no number was replaced.")
+        if not TrafficArrays.of(observation).known:
+            return FilterResult.replaced(command, self._halt(ego), UNKNOWN)
+        if not is_finite(command):
+            return FilterResult.replaced(command, self._halt(ego), NO_NUMBER)
         way = self._way_of(observation, aim)
         if way is None:
             return FilterResult(command)
@@ -191,11 +192,11 @@ class StreetShield(Shield):
 
     def _halt(self, ego: VehicleState) -> Command:
         speed = ego.speed_mps if math.isfinite(ego.speed_mps) else math.inf
-        return Command(max(-self._bounds.braking_mps2, -max(speed, 0.0) / self._period_s), 0.0)
+        return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), 0.0)
 
     def _least(self, ego: VehicleState) -> float:
         """Hardest braking that does not ask for more than a stand."""
-        return max(-self._car.most_braking_mps2, -max(ego.speed_mps, 0.0) / self._period_s)
+        return max(-self._car.most_braking_mps2, -max(ego.speed_mps, 0.0) / self._dt_s)
 
     def _state(self, ego: VehicleState) -> Array:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._car.rear_to_middle_m)
@@ -226,15 +227,9 @@ class StreetShield(Shield):
 
     def _hardest(self, now: _Instant, asked: float, steering: float, least: float) -> float:
         """The highest acceleration below what is asked that leaves a manoeuvre."""
-        low, high = least, asked
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            if self._leaves(now, Command(middle, steering)) is None:
-                low = middle
-            else:
-                high = middle
-        self._leaves(now, Command(low, steering))
-        return low
+        found = highest(least, asked, lambda one: self._leaves(now, Command(one, steering)) is None, _HALVINGS)
+        self._leaves(now, Command(found, steering))  # the manoeuvre of this one is kept
+        return found
 
     def _steering(self, now: _Instant, way: _Way, law: int) -> float:
         """What a way of steering asks for now."""
@@ -254,7 +249,7 @@ class StreetShield(Shield):
                 if law != failsafe.PURSUE and way is not now.ways[0]:
                     continue
                 poses = failsafe.stopped(
-                    now.state, command.acceleration_mps2, command.steering_rad, self._numbers, self._period_s,
+                    now.state, command.acceleration_mps2, command.steering_rad, self._numbers, self._dt_s,
                     way.rows, at, law,
                 )  # fmt: skip
                 fault = self._fault(now, way, poses)
@@ -270,7 +265,7 @@ class StreetShield(Shield):
         around = now.around
         if len(around.rows):
             row = failsafe.met(
-                poses, self._period_s, self._numbers, around.rows, self._points, self._bounds.others_braking_mps2
+                poses, self._dt_s, self._numbers, around.rows, self._points, self._table.others_braking_mps2
             )
             if row >= 0:
                 return _Fault(around.who[row])
@@ -365,13 +360,13 @@ class StreetShield(Shield):
         """The strictest bound of the acceleration by limits, lights and signs: (m/s2, rule, reason)."""
         ego, speed = observation.ego, max(0.0, observation.ego.speed_mps)
         lane = observation.road.get(ego.lane)
-        limit = self._most.most_mps(math.inf if lane is None else lane.speed_limit_mps)
-        allowed = max((limit - speed) / self._period_s, -_SLOWING_MPS2)
-        strictest = min(allowed, self._bounds.acceleration_mps2), "speed", f"No faster than {speed_words(limit)} here."
+        limit = self._limits.most_mps(math.inf if lane is None else lane.speed_limit_mps)
+        allowed = max((limit - speed) / self._dt_s, -_SLOWING_MPS2)
+        strictest = min(allowed, self._table.acceleration_mps2), "speed", f"No faster than {speed_words(limit)} here."
         if self._skids(ego) and strictest[0] > 0.0:
             strictest = 0.0, "skid", "The tyres slide: no throttle until they hold."
-        bend = float(way.most_mps[max(0, min(len(way.most_mps) - 1, round(station + speed * self._period_s)))])
-        slow = (bend - speed) / self._period_s
+        bend = float(way.most_mps[max(0, min(len(way.most_mps) - 1, round(station + speed * self._dt_s)))])
+        slow = (bend - speed) / self._dt_s
         if slow < strictest[0]:
             strictest = max(slow, -_BRAKING_MPS2 - 1.0), "speed", "The bend ahead is too sharp for this speed."
         nose = station + ego.length_m / 2.0
@@ -384,10 +379,10 @@ class StreetShield(Shield):
             room = ahead
             if ahead < -_OVER_M:  # its front is over it: it may wait so, as long as its tail is not
                 room += astride_m(ego.length_m)
-                if signal.state == "yellow" or speed * speed > 2.0 * self._bounds.gentle_mps2 * max(0.0, room):
+                if signal.state == "yellow" or speed * speed > 2.0 * self._table.gentle_mps2 * max(0.0, room):
                     continue
             cap = self._stopping(speed, room)
-            if cap >= strictest[0] or (signal.state == "yellow" and cap < -self._bounds.gentle_mps2):
+            if cap >= strictest[0] or (signal.state == "yellow" and cap < -self._table.gentle_mps2):
                 continue
             why = f"The light shows {signal.state}."
             if signal.state == "green":
@@ -426,7 +421,7 @@ class StreetShield(Shield):
     def _stopping(self, speed: float, ahead_m: float) -> float:
         """Hardest acceleration after which the car still stops before a line."""
         if ahead_m < 0.05:
-            return -self._bounds.braking_mps2 if speed < 3.0 else math.inf
+            return -self._table.braking_mps2 if speed < 3.0 else math.inf
         return self._stop_lines.most_mps2(speed, ahead_m)
 
     def _line_m(self, way: _Way, at: int, line: _Line) -> float:
@@ -458,9 +453,9 @@ class StreetShield(Shield):
 
     def _around(self, observation: Observation) -> _Around:
         """Everybody who may come near while the ego brakes to a stand."""
-        ego, table, road = observation.ego, self._bounds, observation.road
-        until_s = max(ego.speed_mps, 0.0) / self._car.most_braking_mps2 + 2.0 * self._period_s + self._car.lag_s
-        own = (max(ego.speed_mps, 0.0) + table.acceleration_mps2 * self._period_s) * until_s + ego.length_m + 1.0
+        ego, table, road = observation.ego, self._table, observation.road
+        until_s = max(ego.speed_mps, 0.0) / self._car.most_braking_mps2 + 2.0 * self._dt_s + self._car.lag_s
+        own = (max(ego.speed_mps, 0.0) + table.acceleration_mps2 * self._dt_s) * until_s + ego.length_m + 1.0
         here = Pose(ego.x_m, ego.y_m, ego.heading_rad)
         who: list[VehicleState] = []
         rows: list[tuple[float, ...]] = []
@@ -511,14 +506,6 @@ class StreetShield(Shield):
         if abs(aside) > _ASIDE_M or abs(turned) > _ASTRAY_RAD:
             return straight
         return [(float(start), float(count), station, aside) for start, count in paths]
-
-
-def _known(one: VehicleState) -> bool:
-    return math.isfinite(one.x_m + one.y_m + one.heading_rad + one.speed_mps + one.length_m + one.width_m)
-
-
-def _replaced(command: Command, safe: Command, rule: str, reason: str) -> FilterResult:
-    return FilterResult(safe, (Intervention(rule, reason, command, safe),))
 
 
 def _owed_to(fault: _Fault) -> tuple[str, str]:
