@@ -27,8 +27,8 @@ from chauffeur.safety.shield.crossing import (
     LAST,
     STOPS,
     Array,
+    CrossingPlan,
     Junction,
-    Manoeuvre,
     Motion,
     Outlook,
     runs_along,
@@ -376,17 +376,17 @@ def test_each_way_plan_and_care_is_judged_by_itself() -> None:
             for care in (KIND, DUE, LAST):
                 trouble = together.trouble_s(GAS, way, plan, care)
                 assert trouble == looked(ego, *others).trouble_s(GAS, way, plan, care)
-    clear = Manoeuvre(5.0, 3)
+    clear = CrossingPlan(5.0, 3)
     assert together.trouble_s(GAS, on, clear, DUE) < math.inf
     assert together.trouble_s(GAS, left, clear, DUE) == math.inf
-    stop = Manoeuvre(-8.0, 0)
+    stop = CrossingPlan(-8.0, 0)
     assert together.trouble_s(COAST, left, stop, KIND) < together.trouble_s(COAST, left, stop, DUE)
 
 
 def test_the_crossing_may_take_longer_to_clear_than_a_stop_takes() -> None:
     (on,) = ways(IN, ON)
     outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 0.0, ON), car(1, -49.0, 20.0, 0.0, 2.0, ACROSS))
-    assert outlook.trouble_s(COAST, on, Manoeuvre(5.0, 0), DUE) == math.inf
+    assert outlook.trouble_s(COAST, on, CrossingPlan(5.0, 0), DUE) == math.inf
 
 
 def test_each_law_has_its_wheel() -> None:
@@ -402,8 +402,8 @@ def test_each_law_has_its_wheel() -> None:
 def test_a_tight_turn_needs_the_whole_wheel() -> None:
     (left,) = ways(IN, LEFT)
     outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 6.0, LEFT))
-    assert outlook.trouble_s(COAST, left, Manoeuvre(2.0, 3), DUE) != outlook.trouble_s(
-        COAST, left, Manoeuvre(2.0, 0), DUE
+    assert outlook.trouble_s(COAST, left, CrossingPlan(2.0, 3), DUE) != outlook.trouble_s(
+        COAST, left, CrossingPlan(2.0, 0), DUE
     )
 
 

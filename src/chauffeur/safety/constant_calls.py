@@ -12,9 +12,16 @@ import operator
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
-_LANE_STEPS = {"get_lane_of": 0, "get_left_lane": -1, "get_right_lane": 1}
+LANE_STEPS: Final = {"get_left_lane": -1, "get_lane_of": 0, "get_right_lane": 1}
+"""Driving APIs that name a lane -> lanes to the right of the ego's own."""
+TURNS: Final = {
+    "turn_left_at_next_intersection": -1,
+    "go_straight_at_next_intersection": 0,
+    "turn_right_at_next_intersection": 1,
+}
+"""Driving APIs that choose a way at the next junction -> quarter turns to the right."""
 _MAX_CHARS = 100_000
 _MAX_DEPTH = 40
 _MAX_VALUES = 16
@@ -229,7 +236,7 @@ class _Reader:
         node, scope = self._follow(node, scope)
         if not isinstance(node, ast.Call):
             return None
-        step = _LANE_STEPS.get(self._called(node, scope) or "")
+        step = LANE_STEPS.get(self._called(node, scope) or "")
         if step is None:
             return None
         vehicle = _first_argument(node)

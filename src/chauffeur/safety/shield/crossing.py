@@ -299,7 +299,7 @@ class Outlook:
         beyond = last + math.ceil(self.size[0] / rollout.STEP_M)
         return _Way(at, beyond, hold - self.table.margin_m)
 
-    def trouble_s(self, command: Command, points: Array, plan: Manoeuvre, care: _Care) -> float:
+    def trouble_s(self, command: Command, points: Array, plan: CrossingPlan, care: _Care) -> float:
         """Time until a plan after a command on a way ends badly; infinite if it ends well."""
         asked = command.acceleration_mps2, command.steering_rad, id(points), id(plan), id(care)
         found = self._troubles.get(asked)
@@ -307,7 +307,7 @@ class Outlook:
             found = self._troubles[asked] = self._foreseen(command, points, plan, care)
         return found
 
-    def _foreseen(self, command: Command, points: Array, plan: Manoeuvre, care: _Care) -> float:
+    def _foreseen(self, command: Command, points: Array, plan: CrossingPlan, care: _Care) -> float:
         table, way = self.table, self.way(points)
         asked = command.acceleration_mps2, command.steering_rad
         of_others = (
@@ -329,7 +329,7 @@ class Outlook:
         """The first way, if on each of them the crossing can be cleared after a command: any may be taken."""
         return ways[0] if all(self._ends_well(command, way, CLEARS, care) for way in ways) else None
 
-    def _ends_well(self, command: Command, way: Array, plans: Sequence[Manoeuvre], care: _Care) -> bool:
+    def _ends_well(self, command: Command, way: Array, plans: Sequence[CrossingPlan], care: _Care) -> bool:
         return any(self.trouble_s(command, way, plan, care) == math.inf for plan in plans)
 
     def wheel_rad(self, law: int, points: Array, acceleration_mps2: float) -> float:
@@ -355,13 +355,13 @@ class Outlook:
 
 
 @dataclass(frozen=True, slots=True)
-class Manoeuvre:
+class CrossingPlan:
     mps2: float
     law: int
 
 
-STOPS: Final = tuple(Manoeuvre(-8.0, law) for law in (0, 1, 2))
-CLEARS: Final = tuple(Manoeuvre(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
+STOPS: Final = tuple(CrossingPlan(-8.0, law) for law in (0, 1, 2))
+CLEARS: Final = tuple(CrossingPlan(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
 _YIELDS: Final = "Somebody crosses ahead, and goes first."
 _CLEARS_WHY: Final = "Somebody is coming: the crossing has to be cleared."
 _STRAYS: Final = "The car would leave its way, or get into that of somebody who crosses."
