@@ -57,8 +57,11 @@ def road() -> Observation:
     return HighwayWorld().reset(CROSSING)
 
 
-@settings(max_examples=50, deadline=None)
-@given(speed=st.floats(0.0, 15.0), lateral=finite, yaw=finite, steering=finite, acceleration=st.floats(-8.0, 5.0))
+@settings(max_examples=200, deadline=None)
+@given(
+    speed=st.floats(0.0, 15.0), lateral=finite, yaw=st.floats(-6.0, 6.0), steering=st.floats(-1.5, 1.5),
+    acceleration=st.floats(-8.0, 5.0),
+)  # fmt: skip
 def test_the_vehicle_is_the_worlds_own(
     speed: float, lateral: float, yaw: float, steering: float, acceleration: float
 ) -> None:
@@ -387,24 +390,6 @@ def test_the_crossing_may_take_longer_to_clear_than_a_stop_takes() -> None:
     (on,) = ways(IN, ON)
     outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 0.0, ON), car(1, -49.0, 20.0, 0.0, 2.0, ACROSS))
     assert outlook.trouble_s(COAST, on, CrossingPlan(5.0, 0), DUE) == math.inf
-
-
-def test_each_law_has_its_wheel() -> None:
-    (on,) = ways(IN, ON)
-    outlook = looked(car(EGO, 1.0, -20.0, UPWARDS - 0.2, 5.0, IN))
-    light, straight, best, whole = (outlook.wheel_rad(law, on, 0.0) for law in range(rollout.LAWS))
-    assert straight == 0.0
-    assert light == pytest.approx(0.3)
-    assert whole > 0.5
-    assert best in (0.2, 0.4, 0.6, 0.78)
-
-
-def test_a_tight_turn_needs_the_whole_wheel() -> None:
-    (left,) = ways(IN, LEFT)
-    outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 6.0, LEFT))
-    assert outlook.trouble_s(COAST, left, CrossingPlan(2.0, 3), DUE) != outlook.trouble_s(
-        COAST, left, CrossingPlan(2.0, 0), DUE
-    )
 
 
 # How the vehicle moves ------------------------------------------------------------------------------------------------
