@@ -69,7 +69,7 @@ def least_target_mps(observation: Observation, setpoints: Setpoints, limits: Lim
 
 
 def shoulder_at_right(observation: Observation) -> bool:
-    """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
+    """True if the ego is on a shoulder, or can get to one lane by lane to the right."""
     own = observation.road.get(observation.ego.lane)
     return own is not None and any(
         lane.emergency and lane.index >= own.index for lane in observation.road.abreast(own.id)

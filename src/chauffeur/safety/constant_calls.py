@@ -1,4 +1,4 @@
-"""What can be known of a program without running it: which driving APIs it calls, and with which constants.
+"""Static reading of a program: the driving APIs that it calls, and their constants.
 
 Reading is deliberately modest. It follows names that are bound exactly once, arithmetic of constants, and lanes named
 relative to the ego; everything else is unknown here and stays with the limits that hold while the program runs.
@@ -59,7 +59,7 @@ class ApiUse:
 
 @dataclass(frozen=True, slots=True)
 class ProgramReading:
-    """What was read.
+    """Result of reading a program.
 
     Attributes:
         uses: Every call of a plain name, in source order.

@@ -55,7 +55,7 @@ class _Fault:
 
 @dataclass(frozen=True, slots=True)
 class _Road:
-    """What the checks need of an observation. `lanes` and `index` are 0 where the ego is on no lane of the road."""
+    """Road data that the checks need. `lanes` and `index` are 0 where the ego is on no lane of the road."""
 
     crossing: bool
     lanes: int
@@ -67,7 +67,7 @@ class _Road:
 
 
 def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
-    """Whether every number and manoeuvre that can be read from the plan fits the road, the situation and the limits."""
+    """Judge whether the numbers and manoeuvres that can be read from a plan fit road, situation and limits."""
     if plan.policy is None and plan.refusal:
         return Verdict(PARAMETERS_CHECK, True, "There is no policy to check.", not_compared="no-policy")
     road = _road(observation)
@@ -84,7 +84,7 @@ def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Ve
 
 
 def policy_findings(policy: Policy, situation: Situation, limits: Limits) -> list[str]:
-    """What `check_parameters` will find in a policy, for a planner that can still mend it: line, reason and remedy."""
+    """Findings of `check_parameters` for a policy that a planner can still repair: line, reason and remedy."""
     following = situation.front.speed_mps if situation.front is not None else situation.speed_mps
     road = _Road(
         situation.world == "intersection" or bool(situation.turns),

@@ -25,7 +25,7 @@ FORMAT: Final = 2
 Kind = Literal[
     "opened", "wish", "context", "plan", "verdict", "intervention", "actuation", "outcome", "gap", "redaction", "closed"
 ]  # fmt: skip
-"""What a record tells of. `gap`: records were lost here; `redaction`: personal texts of earlier records were erased."""
+"""Kind of record. `gap`: records were lost here; `redaction`: personal texts of earlier records were erased."""
 
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
@@ -33,7 +33,7 @@ NO_RECORD: Final = "0" * 64
 """`prev` of the first record."""
 
 LINE_START: Final = b'{"body":{'
-"""How every line begins."""
+"""First bytes of every line."""
 
 MAX_LINE_BYTES: Final = 16 << 20
 """Nothing Chauffeur writes is nearly as long."""
@@ -165,7 +165,7 @@ def content_hash(record: AuditRecord) -> str:
 
 
 def is_sealed_with(record: AuditRecord, key: bytes) -> bool:
-    """Whether a record was written under this key."""
+    """True if a record was written under this key."""
     return is_sealed(record.mac, key, _MAC_PURPOSE, canonical(_core(record)))
 
 
@@ -175,7 +175,7 @@ def stamp(moment: datetime) -> str:
 
 
 def torn_end(content: bytes) -> dict[str, Any]:
-    """What a record says of a cut-off write that was taken off the end of a log."""
+    """Fields of a record that account for a cut-off write removed from the end of a log."""
     return {"torn_bytes": len(content), "torn_sha256": hashlib.sha256(content).hexdigest()}
 
 

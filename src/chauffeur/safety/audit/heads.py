@@ -29,7 +29,7 @@ _MAC_PURPOSE = b"chauffeur-audit-head-1\0"
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What the file beside a log says.
+    """Content of the head file beside a log.
 
     Attributes:
         hash: Hash of the last record when it was written.
@@ -44,12 +44,12 @@ class Head:
     mac: str = ""
 
     def is_sealed_with(self, key: bytes) -> bool:
-        """Whether it was written under this key."""
+        """True if it was written under this key."""
         return self.records is not None and is_sealed(self.mac, key, _MAC_PURPOSE, canonical(_fields(self)))
 
 
 def head_path(path: Path) -> Path:
-    """Where the head of a log is kept beside it."""
+    """Path of the head file of a log."""
     return path.with_name(f"{path.name}.head")
 
 
@@ -65,7 +65,7 @@ def leave_head(path: Path, last: str, records: int, *, key: bytes | None, closed
 
 
 def read_head(path: Path) -> Head | None:
-    """What the head file beside a log says, or None where there is no such file.
+    """Read the head file beside a log; None if there is none.
 
     Raises:
         DataError: It is there and cannot be used.

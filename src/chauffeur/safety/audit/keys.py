@@ -43,7 +43,7 @@ def sealed(key: bytes, purpose: bytes, content: bytes) -> str:
 
 
 def is_sealed(mac: str, key: bytes, purpose: bytes, content: bytes) -> bool:
-    """Whether a stated HMAC, which may be any text in a log that was tampered with, is that of a content."""
+    """True if a stated HMAC, which may be any text in a log that was tampered with, is that of a content."""
     return hmac.compare_digest(mac.encode(errors="surrogatepass"), sealed(key, purpose, content).encode())
 
 

@@ -24,7 +24,7 @@ PERSON = "person"
 
 @dataclass(frozen=True, slots=True)
 class Redaction:
-    """What was erased.
+    """Result of a redaction.
 
     Attributes:
         records: Records that held the person's texts.

@@ -31,7 +31,7 @@ _WITHHELD: dict[str, Any] = {"withheld": True}
 
 @dataclass(frozen=True, slots=True)
 class TextState:
-    """How one personal text of a record stands.
+    """State of one personal text of a record.
 
     Attributes:
         name: Its name.
@@ -72,7 +72,7 @@ def hide(
 
 
 def states(record: AuditRecord) -> Iterator[TextState]:
-    """How each personal text of a record stands, and what is wrong with it, if anything."""
+    """Yield the state of each personal text of a record, tampering included."""
     references = _references(record)
     for name in record.texts:
         if name not in references:
@@ -89,7 +89,7 @@ def words_of(record: AuditRecord) -> dict[str, str]:
 
 
 def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) -> bool | None:
-    """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
+    """True if a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
     value = record.texts.get(name)
     if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state in TEXT_CODES:
         return None
@@ -102,7 +102,7 @@ def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) ->
 
 
 def erased(record: AuditRecord) -> dict[str, dict[str, Any]]:
-    """What stands beside the body once every text of a record is erased."""
+    """Texts of a record once all of them are erased."""
     return {name: dict(_ERASED) for name in record.texts}
 
 

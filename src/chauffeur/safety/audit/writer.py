@@ -40,7 +40,7 @@ RETRY_S: Final = 0.5
 """Pause after a failed write."""
 
 PATIENCE_S: Final = 5.0
-"""How long the planning side waits for the disk unless it says otherwise."""
+"""Default time that the planning side waits for the disk."""
 
 _AT_ONCE: Final = 64
 """Records sealed and written together: the interpreter is not kept from control for longer than a millisecond or so."""
@@ -55,7 +55,7 @@ def utc_now() -> datetime:
 
 @dataclass(frozen=True, slots=True)
 class Closing:
-    """How an audit log ended.
+    """Final state of an audit log.
 
     Attributes:
         head: Hash of the last record on the disk. Kept elsewhere, it shows later whether the end was cut off.
@@ -71,7 +71,7 @@ class Closing:
 
     @property
     def complete(self) -> bool:
-        """Whether everything handed over is in the log."""
+        """True if everything handed over is in the log."""
         return not self.lost and not self.trouble
 
 
@@ -168,7 +168,7 @@ class AuditLog:
 
     @property
     def path(self) -> Path:
-        """Where it is written."""
+        """Path of the log."""
         return self._path
 
     @property

@@ -1,4 +1,4 @@
-"""What the set-points of a program count from: "the lead's speed plus 5 m/s", "the lane on the left".
+"""Bases of a program's set-points: "the lead's speed plus 5 m/s", "the lane on the left".
 
 `programs.verify` says which calls may be reached, with which bounds, and how often loops pass; what a bound throws away
 is read here from the text: each name is anything it is ever bound to, whatever the order. That is not sound, and so may
@@ -73,7 +73,7 @@ class _Scope:
 
 @lru_cache(maxsize=64)
 def read_facts(source: str, library: str = "") -> Facts:
-    """What a program does, as far as reading tells; never raises on bad programs. One read before is remembered."""
+    """Read the facts of a program; never raises on bad programs. Results are memoised."""
     if len(source) + len(library) > _MAX_CHARS:
         return Facts(readable=False)
     helpers, program = parse_quietly(library), parse_quietly(source)
@@ -351,7 +351,7 @@ class _Reader:
 
 
 def _exclude(one: Sequence[tuple[int, int]], other: Sequence[tuple[int, int]]) -> bool:
-    """Whether two places stand in different arms of one `if`."""
+    """True if two places stand in different arms of one `if`."""
     arms = dict(other)
     return any(arms.get(test, arm) != arm for test, arm in one)
 

@@ -35,14 +35,14 @@ _CLEARING_MPS: Final = 8.0
 """Speed up to which it does."""
 _STOP_S: Final = 2.5
 _CLEAR_S: Final = 7.0
-"""How long a plan is looked at: by then a car of the crossing's speeds stands, or is through."""
+"""Horizon of a plan: by then a car at the speeds of a crossing stands, or is through."""
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
 _MOVING_MPS: Final = 0.1
 """Slower than this a car stands, and what is asked may bring it back."""
 _FAR_M: Final = 40.0
-"""Where a car that turns will go cannot be told at this distance: it is not minded yet."""
+"""Distance beyond which the way of a turning car cannot be predicted: it is ignored there."""
 _BENT_M: Final = 0.1
 _JOINT_M: Final = 0.5
 _HALVINGS: Final = 8
@@ -53,7 +53,7 @@ _HELD_MPS2: Final = 0.3
 
 @dataclass(frozen=True, slots=True)
 class _Care:
-    """How much is left: time before another arrives, to the side of its way, and to the side of the ego's own."""
+    """Margins of a plan: time before another arrives, to the side of its way, and to the side of the ego's own."""
 
     after_s: float
     merge_s: float
@@ -64,13 +64,13 @@ class _Care:
 
 
 DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
-"""What every command has to leave; a body has its lane, and half a metre that corners are cut by."""
+"""Margins that every command must leave; a body has its lane, and half a metre for cutting corners."""
 KIND: Final = replace(DUE, followers=True)
 """The same, and who follows in the ego's stream could still stop behind it. That can be the follower's own doing."""
 _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=2.0)
 """The same for a car that got off its way: it needs room to get back to it."""
 LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
-"""What is left where that is gone, because others or tyres did what was not foreseen."""
+"""Margins of last resort, once others or tyres did what was not foreseen."""
 _STAYING: Final = replace(LAST, room_m=DUE.room_m)
 """The same on the road."""
 _BESIDE: Final = replace(LAST, side_m=0.05)
@@ -88,7 +88,7 @@ class CrossingResult:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """What is to be known of a way: the nearest point, where nobody crosses any more, where a lead may stop."""
+    """Data of a way: the nearest point, the point beyond which nobody crosses, the place where a lead may stop."""
 
     at: int
     beyond: int
@@ -222,7 +222,7 @@ class Junction:
         return [self._promised]
 
     def _after(self, lane: Lane) -> list[tuple[Lane] | tuple[()]]:
-        """What follows a lane: each lane that begins where it ends, or nothing."""
+        """Successors of a lane, or one empty tuple."""
         return [(one,) for one in self.road.successors(lane.id)] or [()]
 
     def ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
@@ -284,10 +284,10 @@ class Outlook:
     dt_s: float
     _ways: dict[int, _Way] = field(default_factory=dict[int, _Way])
     _troubles: dict[_Asked, float] = field(default_factory=dict[_Asked, float])
-    """What was found already: many a search comes by the same plan twice."""
+    """Memo: searches come by the same plan more than once."""
 
     def way(self, points: Array) -> _Way:
-        """What is to be known of a way before it is driven."""
+        """Data of a way, computed once an instant."""
         way = self._ways.get(id(points))
         if way is None:
             way = self._ways[id(points)] = self._seen(points)
@@ -337,7 +337,7 @@ class Outlook:
         return rollout.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
     def beside_m(self, points: Array) -> float:
-        """How far the body reaches to the side of a way now."""
+        """Lateral reach of the body from a way now, m."""
         return rollout.beside_m(self.state, points, self.way(points).at, self.size)
 
     def stays_s(self, command: Command, way: Array) -> float:

@@ -36,13 +36,13 @@ UNKNOWN: Final = "Where somebody is cannot be told."
 NO_NUMBER: Final = "A command that is no number was replaced."
 _CORNER_M = 0.5
 _CREEP_M = 1e-3
-"""What counts as further over a line than the body is: any more, or it could creep there period by period."""
+"""Tolerance for "further over a line": with any more, the body could creep there period by period."""
 _ALONE_RAD = 0.15
 """Angle to its lane that a slow car needs at most where there is one lane only."""
 _SLOW_MPS = 3.0
 _LANES_AT_ONCE = 2
 _TOUCH_M = 0.05
-"""How far a body must reach over a line to be in the lane beyond it."""
+"""Overlap from which a body is in the lane beyond a line."""
 _LEVEL_MPS2 = 1e-6
 _LEVEL_RAD = 1e-9
 _SURE_M = 1.0
@@ -53,7 +53,7 @@ _SLOWING_MPS2 = 1.0
 
 @dataclass(frozen=True, slots=True)
 class FilterResult:
-    """What may go to the actuator, and what was changed on the way."""
+    """A command that may go to the actuator, and its changes."""
 
     command: Command
     interventions: tuple[Intervention, ...] = ()
@@ -182,7 +182,7 @@ class Shield:
         )
 
     def _too_sharp(self, scene: ShieldScene, speed: float, steering_rad: float) -> bool:
-        """Whether a command turns the car further away from its lane than any lane change needs."""
+        """True if a command turns the car further away from its lane than any lane change needs."""
         before = scene.ego.heading_rad
         after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
         # With one lane there is nowhere to turn to, and a slow car's tyres carry a turn on for a while.
@@ -323,18 +323,18 @@ class Shield:
 
 
 def is_finite(command: Command) -> bool:
-    """Whether both numbers of a command are numbers."""
+    """True if both numbers of a command are finite."""
     return math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)
 
 
 def _known(vehicle: VehicleState) -> bool:
-    """Whether all of its numbers are numbers."""
+    """True if all numbers of a vehicle are finite."""
     total = vehicle.x_m + vehicle.y_m + vehicle.heading_rad + vehicle.speed_mps + vehicle.length_m + vehicle.width_m
     return math.isfinite(total)
 
 
 def _parts_from(road: RoadGraph, lane: LaneId, other: LaneId) -> bool:
-    """Whether two lanes begin at one place and lead to different ones."""
+    """True if two lanes begin at one place and lead to different ones."""
     before = {one.id for one in road.predecessors(lane)} if lane in road else set[LaneId]()
     forks = other in road and any(one.id in before for one in road.predecessors(other))
     return forks and road.places_between(lane, other) is None

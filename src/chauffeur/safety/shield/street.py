@@ -43,22 +43,22 @@ _ALONG_RAD: Final = math.radians(40.0)
 _SIDE_M: Final = 0.15
 _PERSON_SIDE_M: Final = 0.4
 _EDGE_M: Final = 0.1
-"""What the outline may reach over the edge of its ground: the filter knows the car exactly, and lanes to that."""
+"""Tolerance of the outline over the edge of its ground: the filter knows the car exactly, and lanes to that."""
 _EVERY: Final = 2
 """The ground under the car is looked at every so many periods: 3 m apart at 30 m/s, less than half of any body."""
 _FOLLOWS_MPS: Final = 2.5
 _FOLLOWS_S: Final = 0.2
-"""How a line is followed to see what the car takes of the road beside it."""
+"""Speed and period of the walk along a line that measures the road the car takes beside it."""
 _AROUND_ROWS: Final = 3
 _SWING_SHARE: Final = 1.25
-"""Who comes into a bend from beside the middle of its lane swings out by so much more."""
+"""A car that enters a bend beside the middle of its lane swings out by this factor more."""
 _SKID_RADPS: Final = 0.2
 """Tyres that hold turn a car as its wheel says, to less than this; at 0.4 rad/s a car on snow is on its way round."""
 _OVERHANG_M: Final = 0.3
-"""What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
+"""Overhang of a bumper over a kerb in a bend that is too tight otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
 _OVER_M: Final = 1.0
-"""Who is farther over a line than this, and cannot wait with its tail before it, clears the junction."""
+"""A car farther over a line than this, which cannot wait with its tail before it, clears the junction."""
 _SERVED_MPS: Final = 0.1
 _AT_SIGN_M: Final = 4.0
 _CLEAR_M: Final = 3.5
@@ -69,7 +69,7 @@ _BEND_MPS2: Final = 3.0
 _BRAKING_MPS2: Final = 3.0
 _ASTRAY_RAD: Final = 0.7
 _ASIDE_M: Final = 2.2
-"""Who is turned by more against their lane, or farther beside its middle, follows no lane."""
+"""A vehicle turned by more against its lane, or farther beside its middle, follows no lane."""
 _WAYS: Final = 3
 """Ways on that somebody may take are followed up to so many."""
 
@@ -98,7 +98,7 @@ class _Way:
     edge_m: Array
 
     def station_m(self, ego: VehicleState) -> float:
-        """How far along the line the ego is."""
+        """Station of the ego on the line, m."""
         low = max(0, int(self.starts_m[self.own]) - 6)
         after = self.starts_m[self.own + 1] if self.own + 1 < len(self.starts_m) else self.line.length_m
         own = self.rows[low : int(after) + 7]
@@ -107,7 +107,7 @@ class _Way:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Around:
-    """Who is to be minded: rows as of `failsafe`, and who they are."""
+    """Relevant agents: rows as of `failsafe`, and the vehicles they stand for."""
 
     who: tuple[VehicleState, ...]
     rows: Array
@@ -232,7 +232,7 @@ class StreetShield(Shield):
         return found
 
     def _steering(self, now: _Instant, way: _Way, law: int) -> float:
-        """What a way of steering asks for now."""
+        """Wheel angle of a steering law now, rad."""
         if law == failsafe.HELD:
             return now.ego.steering_rad
         if law == failsafe.STRAIGHT:
@@ -272,7 +272,7 @@ class StreetShield(Shield):
         return None
 
     def _strays(self, ground: Ground, way: _Way, poses: Array) -> bool:
-        """Whether the outline leaves its ground on a way, or gets farther out where it is out already."""
+        """True if the outline leaves its ground on a way, or gets farther out where it is out already."""
         poses = np.concatenate([poses[:2], poses[2:-1:_EVERY], poses[-1:]])
         car, places = self._car, poses[:, :3]
         beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True)
@@ -408,7 +408,7 @@ class StreetShield(Shield):
         return strictest
 
     def _skids(self, ego: VehicleState) -> bool:
-        """Whether a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
+        """True if a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
         wheel = ego.speed_mps * curvature_of(ego.speed_mps, ego.steering_rad, self._car)
         return self._car.stray_s > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
 
@@ -435,7 +435,7 @@ class StreetShield(Shield):
         return found
 
     def _held_up(self, observation: Observation, way: _Way, station: float, ahead: float) -> bool:
-        """Whether somebody who stands leaves no room behind a line for all of the car."""
+        """True if a standing vehicle leaves no room behind a line for all of the car."""
         ego = observation.ego
         line = station + ego.length_m / 2.0 + ahead
         for other in observation.others:
