@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 from audit_logs import ABOUT, BROKEN, KEY, OTHER_KEY, WISH, chain, fields, look, old_log, refusing, write
+from golden_sentences import compare
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from sentences import compare
 
 from chauffeur.concept import ChauffeurError, PersonId
 from chauffeur.safety.audit import (

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from audit_logs import ABOUT, KEY, OTHER_KEY, fields, old_log, ticking, write
-from sentences import compare
+from golden_sentences import compare
 
 from chauffeur.concept import ConfigError, DataError, PersonId
 from chauffeur.safety.audit import AuditLog, head_path, redact, redaction, verify

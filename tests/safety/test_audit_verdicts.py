@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import pytest
 from audit_logs import KEY, OTHER_KEY, chain, fields, look
-from sentences import compare
+from golden_sentences import compare
 
 from chauffeur.concept import DataError
 from chauffeur.safety.audit import Kind

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
+from golden_sentences import compare
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from sentences import compare
 
 from chauffeur.concept import Command, Frame, LaneId, Observation, Setpoints, VehicleState
 from chauffeur.safety.blame import Blame, blame, in_the_way

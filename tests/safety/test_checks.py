@@ -8,17 +8,15 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import pytest
-from scenes import plan, program, snap
-from sentences import compare, outcome, row
+from check_scenes import judged_by, parameters, plan, program, snap
+from golden_sentences import compare, outcome, row
 
 from chauffeur.concept import (
     ActionMatrix,
     Limits,
     Observation,
-    Parameters,
     Plan,
     Program,
     Trajectory,
@@ -26,11 +24,12 @@ from chauffeur.concept import (
 )
 from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS, run_checks
 from chauffeur.safety.envelope import check_parameters
-from chauffeur.safety.format import FORMAT_CHECK, check_format
+from chauffeur.safety.format import check_format
 from chauffeur.safety.minimum_speed import check_minimum_speed
 from chauffeur.safety.reach import check_reach
 
 LIMITS = Limits()
+judge = judged_by(check_format, "format-v1")
 BIG = 10**400
 ONES = (1.0, 1.0, 1.0)
 
@@ -57,18 +56,6 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         monkeypatch.setitem(sys.modules, "chauffeur.programs.gate", module)
 
     return use
-
-
-def judge(plan: Plan, observation: Observation) -> Verdict:
-    verdict = check_format(plan, observation, LIMITS)
-    assert verdict.check == FORMAT_CHECK == "format-v1"
-    assert verdict.reason
-    assert bool(verdict.remedy) is not verdict.passed
-    return verdict
-
-
-def parameters(lane: Any = 0, speed: Any = 20.0, ahead: Any = 20.0, ratio: Any = 1.0, route: str = "") -> Parameters:
-    return Parameters(speed, ahead, ratio, lane, route)
 
 
 def test_a_plan_that_says_why_it_drives_nothing_is_not_compared() -> None:

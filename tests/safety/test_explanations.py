@@ -6,8 +6,8 @@ import asyncio
 from dataclasses import replace
 
 import pytest
-from scenes import snap
-from sentences import compare
+from check_scenes import snap
+from golden_sentences import compare
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from sentences import compare
+from golden_sentences import compare
 
 from chauffeur.concept import ActionMatrix, Limits, Observation, Plan, Thoughts, Trajectory, VehicleState
 from chauffeur.geometry import Lane, Polyline, RoadGraph

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from scenes import plan, snap
-from sentences import compare, row
+from check_scenes import plan, snap
+from golden_sentences import compare, row
 
 from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Thoughts
 from chauffeur.geometry import RoadGraph

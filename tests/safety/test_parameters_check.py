@@ -7,39 +7,25 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from scenes import plan, program, snap
-from sentences import compare, outcome, row
+from check_scenes import judged_by, parameters, plan, program, snap
+from golden_sentences import compare, outcome, row
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     ActionMatrix,
     Lead,
     Limits,
-    Observation,
     Parameters,
-    Plan,
     Program,
     Trajectory,
-    Verdict,
 )
-from chauffeur.safety.envelope import PARAMETERS_CHECK, check_parameters
+from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import check_format
 
 LIMITS = Limits()
+judge = judged_by(check_parameters, "parameters-v1")
 CAPPED = Limits(max_speed_mps=20.0)
 IDLE = program("pass")
-
-
-def judge(plan: Plan, observation: Observation, limits: Limits = LIMITS) -> Verdict:
-    verdict = check_parameters(plan, observation, limits)
-    assert verdict.check == PARAMETERS_CHECK == "parameters-v1"
-    assert verdict.reason
-    assert bool(verdict.remedy) is not verdict.passed
-    return verdict
-
-
-def parameters(lane: Any = 0, speed: Any = 20.0, ahead: Any = 20.0, ratio: Any = 1.0, route: str = "") -> Parameters:
-    return Parameters(speed, ahead, ratio, lane, route)
 
 
 Case = tuple[Any, dict[str, Any], dict[str, Any]]

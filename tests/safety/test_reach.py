@@ -7,31 +7,30 @@ import time
 from typing import Any
 
 import pytest
-from scenes import plan, program, snap
-from sentences import compare, outcome, row
+from check_scenes import judged_by, plan, program, snap
+from golden_sentences import compare, outcome, row
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     Instruction,
     Lead,
     Limits,
-    Observation,
     Parameters,
     Plan,
     PlanRequest,
     Program,
     SystemMessage,
-    Verdict,
 )
 from chauffeur.describe import describe
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.programs import APIS, check_source
 from chauffeur.safety.checks import run_checks
-from chauffeur.safety.reach import REACH_CHECK, check_reach
+from chauffeur.safety.reach import check_reach
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 from chauffeur.worlds.highway.world import HighwayWorld
 
 LIMITS = Limits()
+judge = judged_by(check_reach, "reach-v1")
 STRICT = {"min_time_headway_s": 1.0, "max_time_headway_s": 3.0}
 CAPPED = {"max_speed_mps": 20.0}
 ON = "yield autopilot()\n"
@@ -40,14 +39,6 @@ ON = "yield autopilot()\n"
 
 def helper(body: str) -> str:
     return "def go():\n" + "".join(f"    {line}\n" for line in [*body.splitlines(), ON.strip()])
-
-
-def judge(plan: Plan, observation: Observation, limits: Limits = LIMITS) -> Verdict:
-    verdict = check_reach(plan, observation, limits)
-    assert verdict.check == REACH_CHECK == "reach-v1"
-    assert verdict.reason
-    assert bool(verdict.remedy) is not verdict.passed
-    return verdict
 
 
 REFUSED = (

@@ -21,7 +21,7 @@ def bounded(
     """The wishes, with numbers brought within the limits, and the names of what was changed.
 
     Args:
-        wishes: As the policy states them.
+        setpoints: As the policy states them.
         limits: Of the person and the operator.
         speed_limit_mps: Of the lane that is driven.
         least_mps: Least speed a policy may ask for there, within the limits; 0 where there is none.

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from chauffeur.concept import Lead, Observation, Plan, Policy, Program, Thoughts, VehicleState
+from chauffeur.concept import (
+    Lead,
+    Limits,
+    Observation,
+    Parameters,
+    Plan,
+    Policy,
+    Program,
+    Thoughts,
+    VehicleState,
+    Verdict,
+)
+from chauffeur.safety.base import Check
 from roads import a_lane, a_road
 
 LIMIT_MPS = 30.0
@@ -35,3 +48,21 @@ def program(body: str, library: str = "") -> Program:
     lines = "".join(f"    {line}\n" for line in body.splitlines())
     source = f"def policy():\n    ego = get_ego_vehicle()\n{lines}    yield autopilot()\n"
     return Program(source, library=library)
+
+
+def parameters(lane: Any = 0, speed: Any = 20.0, ahead: Any = 20.0, ratio: Any = 1.0, route: str = "") -> Parameters:
+    """Good parameters, but for what is given."""
+    return Parameters(speed, ahead, ratio, lane, route)
+
+
+def judged_by(check: Check, name: str) -> Callable[..., Verdict]:
+    """A check whose every verdict has its name, a reason, and a remedy where it refuses."""
+
+    def judge(plan: Plan, observation: Observation, limits: Limits = Limits()) -> Verdict:  # noqa: B008
+        verdict = check(plan, observation, limits)
+        assert verdict.check == name
+        assert verdict.reason
+        assert bool(verdict.remedy) is not verdict.passed
+        return verdict
+
+    return judge
