@@ -130,8 +130,7 @@ class Shield:
         speed = observation.ego.speed_mps
         steering = 0.0
         if scene is not None:
-            own = _own(scene)
-            steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
+            steering = self._back_to(scene, _own(scene), speed)
         return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
 
     def _guard_of(self, observation: Observation) -> Junction:
@@ -149,9 +148,7 @@ class Shield:
         """
         own = _own(scene)
         if crossings:  # where roads cross, the way is judged as it bends, and as the tyres take it
-            steering = recovery_steering(
-                scene.ego, own.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature
-            )
+            steering = self._back_to(scene, own, ego.speed_mps)
             return _Steered(command, _lanes_wide(scene, self._swept(scene, ego, steering, own)), own.lane)
         back = next((strip for strip in scene.strips if strip.lane == self._back), own)
         why = ""
@@ -163,23 +160,19 @@ class Shield:
             if not reason:
                 return _Steered(command, _lanes_wide(scene, span), lane.lane)
             why = why or reason
-        steering = recovery_steering(scene.ego, back.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature)
+        steering = self._back_to(scene, back, ego.speed_mps)
         mended = Command(command.acceleration_mps2, steering)
         changed = abs(steering - command.steering_rad) > _LEVEL_RAD
         said = (Intervention("lane", why, command, mended),) if changed else ()
         return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)), back.lane, said)
 
+    def _back_to(self, scene: ShieldScene, lane: Strip, speed_mps: float) -> float:
+        return recovery_steering(scene.ego, lane.centre_m, speed_mps, self._table.steering_rad, scene.curvature)
+
     def _swept(self, scene: ShieldScene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
-        return swept(
-            scene.ego,
-            ego.speed_mps,
-            (ego.length_m, ego.width_m),
-            steering_rad,
-            lane.centre_m,
-            self._table.steering_rad,
-            self._dt_s,
-            scene.curvature,
-        )
+        size = ego.length_m, ego.width_m
+        most_rad, dt_s = self._table.steering_rad, self._dt_s
+        return swept(scene.ego, ego.speed_mps, size, steering_rad, lane.centre_m, most_rad, dt_s, scene.curvature)
 
     def _too_sharp(self, scene: ShieldScene, speed: float, steering_rad: float) -> bool:
         """True if a command turns the car further away from its lane than any lane change needs."""
@@ -230,14 +223,7 @@ class Shield:
                 if cap < -table.gentle_mps2
                 else ""
             )
-        needed = table.margin_m + rss_gap_m(
-            other.along_mps,
-            ego.along_mps,
-            0.0 if touched else table.others_response_s,
-            table.others_acceleration_mps2,
-            table.others_sure_braking_mps2,
-            table.gentle_mps2,
-        )
+        needed = table.entry_gap_m(other.along_mps, ego.along_mps, 0.0 if touched else table.others_response_s)
         if is_m < needed:
             return f"The lane is not free: a car {is_m:.0f} m behind in it needs {needed:.0f} m."
         return ""

@@ -27,7 +27,7 @@ from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle, c
 from chauffeur.geometry import Polyline, Pose, RoadGraph, Route, joined, wrap_to_pi
 from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield import failsafe
-from chauffeur.safety.shield.gaps import highest, rss_gap_m
+from chauffeur.safety.shield.gaps import highest
 from chauffeur.safety.shield.shield import NO_NUMBER, UNKNOWN, FilterResult, Shield, is_finite
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.shield.traffic_arrays import TrafficArrays
@@ -474,10 +474,7 @@ class StreetShield(Shield):
                     if abs(line.sees(ego.x_m, ego.y_m)[1]) < (ego.width_m + other.width_m) / 2.0:
                         continue  # who comes from behind minds the ego
                 if along and ahead < 0.0:
-                    entry = table.margin_m + rss_gap_m(
-                        speed, ego.speed_mps, response, table.others_acceleration_mps2, table.others_sure_braking_mps2,
-                        table.gentle_mps2,
-                    )  # fmt: skip
+                    entry = table.entry_gap_m(speed, ego.speed_mps, response)
             if math.hypot(ahead, aside) > own + max(speed * until_s, after, entry) + other.length_m:
                 continue  # out of reach until the ego stands
             side = _PERSON_SIDE_M if person else _SIDE_M
