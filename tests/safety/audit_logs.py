@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import time
@@ -12,12 +13,14 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from chauffeur.safety.audit import AuditLog, AuditVerification, Closing, Kind, verify_stream
+from chauffeur.safety.audit import AuditLog, AuditVerification, Closing, Kind, head_path, verify_stream
 from chauffeur.safety.audit.entries import NO_RECORD, seal
+from chauffeur.safety.audit.keys import key_name
 
 KEY = b"a key of thirty-two bytes, quite"
 OTHER_KEY = b"another key of thirty-two bytes!"
 ABOUT = {"scenario": "cruise", "seed": 7, "simulated": True}
+BROKEN = OSError(errno.EIO, "broken")
 WISH = "Überhol ihn, 快点 – \ud800"
 
 
@@ -60,6 +63,15 @@ def counting_salt() -> Callable[[int], bytes]:
     return salt
 
 
+def refusing(error: OSError) -> Callable[..., Any]:
+    """Stands in for a call of the operating system that fails."""
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise error
+
+    return refuse
+
+
 @contextmanager
 def far_east() -> Generator[None]:
     """The machine stands where it is nine hours later."""
@@ -94,3 +106,16 @@ def fields(line: bytes) -> dict[str, Any]:
     """A line as plain JSON."""
     value: dict[str, Any] = json.loads(line)
     return value
+
+
+def old_log(path: Path, key: bytes | None) -> Path:
+    """A log of format 1, whose head nothing sealed."""
+    last, content = "0" * 64, b""
+    for number, (kind, body) in enumerate(
+        (("opened", {"format": 1, "key": "" if key is None else key_name(key)}), ("closed", {"lost": 0}))
+    ):
+        line, last = seal(number, last, kind, "2026-01-02T03:04:05.000+00:00", body, {}, key)
+        content += line
+    path.write_bytes(content)
+    head_path(path).write_text(f"{last}\n")
+    return path

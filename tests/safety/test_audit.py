@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import hmac
 import json
+import os
 import re
+from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 
 import pytest
-from audit_logs import ABOUT, KEY, OTHER_KEY, WISH, fields, look, write
+from audit_logs import ABOUT, BROKEN, KEY, OTHER_KEY, WISH, chain, fields, look, old_log, refusing, write
+from golden_sentences import compare
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from chauffeur.safety.audit import KINDS, head_path, read_records, verify, words_of
-from chauffeur.safety.audit.entries import NotARecordError, parse, seal, storable
+from chauffeur.concept import ChauffeurError, PersonId
+from chauffeur.safety.audit import (
+    KINDS,
+    AuditLog,
+    head_path,
+    read_key,
+    read_records,
+    reader,
+    redact,
+    redaction,
+    verify,
+    words_of,
+)
+from chauffeur.safety.audit.entries import AuditRecord, NotARecordError, canonical, parse, seal, storable
+from chauffeur.safety.audit.keys import key_name
+from chauffeur.safety.audit.reader import AuditLine, lines
+from chauffeur.safety.audit.storage import LogFile
 from chauffeur.version import __version__
 
 VARIANTS = {"plain": {}, "keyed": {"key": KEY}, "private": {"private": True}, "both": {"key": KEY, "private": True}}
@@ -252,3 +272,167 @@ def test_any_body_is_written_and_read(body: dict[str, object], seq: int) -> None
 def test_what_is_no_record_is_refused_in_one_way(line: bytes) -> None:
     with pytest.raises(NotARecordError):
         parse(line)
+
+
+def test_a_key_is_called_by_sixteen_digits_of_its_seal() -> None:
+    assert key_name(KEY) == hmac.new(KEY, b"chauffeur-audit-key-1\0", "sha256").hexdigest()[:16]
+
+
+@pytest.mark.parametrize("length", [16, 17, 4095, 4096])
+def test_keys_of_a_fit_length_are_read_whole(tmp_path: Path, length: int) -> None:
+    (tmp_path / "key").write_bytes(b"k" * length)
+    assert read_key(tmp_path / "key") == b"k" * length
+
+
+def test_a_log_comes_line_by_line_and_what_is_too_long_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reader, "MAX_LINE_BYTES", 4)
+    assert list(lines(BytesIO(b"abc\n\nabcdefg\nab"))) == [
+        AuditLine(1, b"abc", whole=True),
+        AuditLine(2, b"", whole=True),
+        AuditLine(3, b"abcd", whole=True),  # no record, but nothing that a write was cut off in either
+        AuditLine(4, b"efg", whole=True),
+        AuditLine(5, b"ab", whole=False),
+    ]
+
+
+def test_what_follows_the_last_line_end_is_no_record(tmp_path: Path) -> None:
+    first, second = chain(("opened", {}), ("wish", {}))
+    (tmp_path / "log").write_bytes(first + b"\n" + second + second[:-1])
+    assert [(number, record.kind) for number, record in read_records(tmp_path / "log")] == [(1, "opened"), (3, "wish")]
+
+
+def test_what_json_lacks_is_stored_in_words() -> None:
+    odd = {1: float("nan"), "a": (float("inf"), [float("-inf"), {None: 0.5}]), "b": 7}
+    assert storable(odd) == {"1": "NaN", "a": ["Infinity", ["-Infinity", {"None": 0.5}]], "b": 7}
+
+
+FIELDS = {"body": {}, "hash": "h", "kind": "wish", "prev": "p", "seq": 0, "time": "t"}
+
+
+@pytest.mark.parametrize("seq", [0, (1 << 63) - 1])
+def test_a_bare_record_has_no_texts_and_no_seal(seq: int) -> None:
+    assert parse(canonical(FIELDS | {"seq": seq})) == AuditRecord(seq, "t", "wish", {}, "p", "h", {}, "")
+
+
+# What cannot be used --------------------------------------------------------------------------------------------------
+
+Patch = pytest.MonkeyPatch
+ANA = PersonId("ana")
+NO_MEDIUM = OSError("no medium")
+
+
+def holding(content: bytes) -> Callable[[Path], object]:
+    return lambda path: path.write_bytes(content)
+
+
+def nothing(path: Path) -> None:
+    pass
+
+
+def plain(path: Path) -> None:
+    write(path)
+
+
+def keyed(path: Path) -> None:
+    write(path, key=KEY)
+
+
+def changed(path: Path) -> None:
+    keyed(path)
+    path.write_bytes(path.read_bytes().replace(b"format-v1", b"format-v2", 1))
+
+
+def cut_off(path: Path) -> None:
+    keyed(path)
+    path.write_bytes(path.read_bytes().splitlines(keepends=True)[0])
+
+
+def with_head(content: bytes) -> Callable[[Path], object]:
+    def make(path: Path) -> None:
+        write(path)
+        head_path(path).write_bytes(content)
+
+    return make
+
+
+def patched(owner: object, name: str, error: OSError, act: Callable[[Path], object]) -> Callable[[Path, Patch], object]:
+    def do(path: Path, patch: Patch) -> None:
+        patch.setattr(owner, name, refusing(error))
+        act(path)
+
+    return do
+
+
+def erase(path: Path, patch: Patch) -> None:
+    redact(path, ANA, key=KEY)
+
+
+def erase_while_it_is_written(path: Path, patch: Patch) -> None:
+    with AuditLog(path, about={}, key=KEY):
+        erase(path, patch)
+
+
+def write_on(path: Path, key: bytes | None = None) -> None:
+    AuditLog(path, about={}, key=key)
+
+
+def write_twice(path: Path, patch: Patch) -> None:
+    with AuditLog(path, about={}):
+        write_on(path)
+
+
+UNUSABLE: dict[str, tuple[Callable[[Path], object], Callable[[Path, Patch], object]]] = {
+    **{f"a key of {size} bytes": (holding(b"k" * size), lambda path, _: read_key(path))
+       for size in (0, 15, 4097, 9000)},
+    **{f"a key, {error}": (nothing, patched(Path, "open", error, read_key)) for error in (BROKEN, NO_MEDIUM)},
+    "no log": (nothing, lambda path, _: verify(path)),
+    **{f"a log, {error}": (plain, patched(Path, "open", error, lambda path: [*read_records(path)]))
+       for error in (BROKEN, NO_MEDIUM)},
+    "no record": (holding(b"Dear diary\n"), lambda path, _: verify(path)),
+    "a newer log": (holding(chain(("opened", {"format": 3}))[0]), lambda path, _: verify(path)),
+    "a head given": (plain, lambda path, _: verify(path, head="X" * 64)),
+    "a head beside it": (with_head(b"A" * 64), lambda path, _: verify(path)),
+    "a head in other letters": (with_head(b"\xe9"), lambda path, _: verify(path)),
+    "a head that is damaged": (with_head(b"{"), lambda path, _: verify(path)),
+    "erasing in no log": (nothing, erase),
+    "erasing without the key": (keyed, lambda path, _: redact(path, ANA)),
+    "erasing under another key": (keyed, lambda path, _: redact(path, ANA, key=OTHER_KEY)),
+    "erasing what was changed": (changed, erase),
+    "erasing what is written": (keyed, erase_while_it_is_written),
+    **{f"erasing, {error}": (plain, patched(redaction, "replace_whole", error, lambda path: redact(path, ANA)))
+       for error in (BROKEN, NO_MEDIUM)},
+    **{f"writing on in {content!r}": (holding(content), lambda path, _: write_on(path))
+       for content in (b"no line end", b"a line\n", b"a line\nand a half", b'{"body":[', b"no")},
+    "writing on without the key": (keyed, lambda path, _: write_on(path)),
+    "writing on under another key": (keyed, lambda path, _: write_on(path, OTHER_KEY)),
+    "writing on in what was changed": (changed, lambda path, _: write_on(path, KEY)),
+    "writing on in what was cut off": (cut_off, lambda path, _: write_on(path, KEY)),
+    "writing on in an old log under a key": (lambda path: old_log(path, KEY), lambda path, _: write_on(path, KEY)),
+    "two writers": (plain, write_twice),
+    "a log that is a folder": (Path.mkdir, lambda path, _: write_on(path)),
+    "a log in a file": (holding(b""), lambda path, _: write_on(path / "log")),
+    **{f"a new log, {error}": (nothing, patched(os, "open", error, write_on))
+       for error in (OSError(errno.EROFS, "only for reading"), NO_MEDIUM)},
+    "a head that is a folder": (lambda path: head_path(path).mkdir(), lambda path, _: write_on(path, KEY)),
+}  # fmt: skip
+
+
+def test_what_cannot_be_used_is_said_and_left_as_it_is(tmp_path: Path) -> None:
+    said: dict[str, list[object]] = {}
+    for number, (name, (make, use)) in enumerate(UNUSABLE.items()):
+        path = tmp_path / str(number) / "log"
+        path.parent.mkdir()
+        make(path)
+        before = path.read_bytes() if path.is_file() else None
+        with pytest.raises(ChauffeurError) as caught, pytest.MonkeyPatch.context() as patch:
+            use(path, patch)
+        error = caught.value
+        texts = (text.replace(str(path), "PATH") for text in (error.message, error.hint))
+        said[name] = [type(error).__name__, *(re.sub(r"\b[0-9a-f]{64}\b", "HASH", text) for text in texts)]
+        if before is not None and use in (erase_while_it_is_written, write_twice):
+            assert path.read_bytes().startswith(before), name
+        elif not path.is_dir():
+            assert (path.read_bytes() if path.is_file() else b"") == (before or b""), name
+        if path.is_file():
+            LogFile(path).close()  # the lock was given back
+    compare("audit: errors", said)

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from audit_logs import ABOUT, KEY, OTHER_KEY, fields, ticking, write
+from audit_logs import ABOUT, KEY, OTHER_KEY, fields, old_log, ticking, write
+from golden_sentences import compare
 
-from chauffeur.concept import DataError, PersonId
+from chauffeur.concept import ConfigError, DataError, PersonId
 from chauffeur.safety.audit import AuditLog, head_path, redact, redaction, verify
-from chauffeur.safety.audit.entries import seal
-from chauffeur.safety.audit.heads import leave_head, read_head
-from chauffeur.safety.audit.keys import key_name
+from chauffeur.safety.audit.heads import Head, leave_head, read_head
 
 
 @pytest.fixture
@@ -94,20 +93,29 @@ def test_every_cut_is_found_whatever_is_done_to_the_head(path: Path) -> None:
 
 
 def test_what_is_wrong_with_an_end_is_said(path: Path) -> None:
-    head = head_path(path)
+    head, open_end = head_path(path), crashed(path.with_name("open"))
     sealed = head.read_bytes()
     before = json.loads(sealed)
+    found: dict[str, list[object]] = {}
+
+    def is_said(*codes: str, of: Path = path) -> None:
+        findings = verify(of, key=KEY).findings
+        assert tuple(one.code for one in findings) == codes
+        found.update({one.code: [one] for one in findings if one.line is None and one.code != "head_absent"})
+
     head.unlink()
-    assert said(path) == ["headfile_missing"]
+    is_said("headfile_missing")
     leave_head(path, before["hash"], before["records"], key=OTHER_KEY)
-    assert said(path) == ["headfile_unsealed"]
+    is_said("headfile_unsealed")
     head.write_bytes(f"{before['hash']}\n".encode())
-    assert said(path) == ["headfile_unsealed"]
+    is_said("headfile_unsealed")
     leave_head(path, fields(lines_of(path)[4])["hash"], 5, key=KEY)
-    assert said(path) == ["headfile_other"]
+    is_said("headfile_other")
     head.write_bytes(sealed)
     last = cut(path, 5)
-    assert said(path) == ["head_absent", "end_cut"]
+    is_said("head_absent", "end_cut")
+    is_said("end_open", of=open_end)
+    compare("audit: ends", found)
     assert verify(path, key=KEY, head=last).end == "whole", "a head that was kept elsewhere vouches, too"
 
 
@@ -124,7 +132,6 @@ def test_a_log_that_was_not_closed_is_said_gone_on_with_and_said_for_ever(tmp_pa
     path = crashed(tmp_path / "log")
     found = verify(path, key=KEY)
     assert (found.ok, found.usable, found.end, found.closed) == (False, True, "open", False)
-    assert said(path) == ["end_open"]
     open_log(path).close()
     found = verify(path, key=KEY)
     assert (found.ok, found.end, found.unclosed) == (True, "whole", 1)
@@ -181,27 +188,6 @@ def test_a_crash_while_erasing_leaves_a_log_that_goes_on(path: Path, monkeypatch
     assert verify(path, key=KEY).ok
 
 
-def test_a_head_that_cannot_be_written_at_the_opening_is_said(tmp_path: Path) -> None:
-    head_path(tmp_path / "log").mkdir()
-    with pytest.raises(DataError, match=r"head file .* cannot be read|head file .* cannot be written"):
-        open_log(tmp_path / "log")
-    head_path(tmp_path / "log").rmdir()
-    open_log(tmp_path / "log").close()
-
-
-def old_log(path: Path, key: bytes | None) -> Path:
-    """A log of format 1, whose head nothing sealed."""
-    last, content = "0" * 64, b""
-    for number, (kind, body) in enumerate(
-        (("opened", {"format": 1, "key": "" if key is None else key_name(key)}), ("closed", {"lost": 0}))
-    ):
-        line, last = seal(number, last, kind, "2026-01-02T03:04:05.000+00:00", body, {}, key)
-        content += line
-    path.write_bytes(content)
-    head_path(path).write_text(f"{last}\n")
-    return path
-
-
 def test_a_log_of_the_old_format_is_read_and_under_a_key_not_gone_on_with(tmp_path: Path) -> None:
     plain, keyed = old_log(tmp_path / "plain", None), old_log(tmp_path / "keyed", KEY)
     assert verify(plain).ok
@@ -213,3 +199,20 @@ def test_a_log_of_the_old_format_is_read_and_under_a_key_not_gone_on_with(tmp_pa
     with pytest.raises(DataError, match="of format 1, whose end its key does not vouch for, so it is not continued"):
         open_log(keyed)
     assert verify(keyed, key=KEY).ok
+
+
+def test_a_head_beside_a_log_is_read_without_its_line_end(tmp_path: Path) -> None:
+    assert head_path(tmp_path / "log.jsonl") == tmp_path / "log.jsonl.head"
+    assert read_head(tmp_path / "log") is None
+    head_path(tmp_path / "log").write_text(f" {'0123456789abcdef' * 4}\n")
+    assert read_head(tmp_path / "log") == Head("0123456789abcdef" * 4)
+
+
+@pytest.mark.parametrize("head", ["", "a" * 63, "a" * 65, "A" * 64, "g" * 64, "X" * 64])
+def test_what_is_no_head_is_said(tmp_path: Path, head: str) -> None:
+    write(tmp_path / "log")
+    with pytest.raises(ConfigError, match="The head given"):
+        verify(tmp_path / "log", head=head)
+    head_path(tmp_path / "log").write_text(head)
+    with pytest.raises(ConfigError, match="The head in"):
+        verify(tmp_path / "log")

@@ -61,15 +61,7 @@ def test_what_is_within_the_limits_goes_on_as_it_is(speed: float | None, headway
 
 @pytest.mark.parametrize(
     ("speed", "goes_on"),
-    [
-        (0.0, 0.0),
-        (31.0, 31.0),
-        (31.01, 31.0),
-        (math.inf, 31.0),
-        (-0.01, 0.0),
-        (-math.inf, 0.0),
-        (math.nan, 0.0),
-    ],
+    [(0.0, 0.0), (31.0, 31.0), (31.01, 31.0), (math.inf, 31.0), (-0.01, 0.0), (-math.inf, 0.0), (math.nan, 0.0)],
 )
 def test_a_speed_above_the_cap_becomes_the_cap_and_any_other_stops_the_car(speed: float, goes_on: float) -> None:
     setpoints, changed = bounded(Setpoints(speed), LIMITS, SIGN)
@@ -79,17 +71,9 @@ def test_a_speed_above_the_cap_becomes_the_cap_and_any_other_stops_the_car(speed
 
 @pytest.mark.parametrize(
     ("headway", "goes_on"),
-    [
-        (0.5, 0.5),
-        (0.49, 0.5),
-        (-3.0, 0.5),
-        (-math.inf, 0.5),
-        (10.0, 10.0),
-        (10.1, 10.0),
-        (math.inf, 10.0),
-        (math.nan, 10.0),
-    ],
-)
+    [(0.5, 0.5), (0.49, 0.5), (-3.0, 0.5), (-math.inf, 0.5), (10.0, 10.0), (10.1, 10.0), (math.inf, 10.0),
+     (math.nan, 10.0)],
+)  # fmt: skip
 def test_a_headway_too_short_becomes_the_shortest_and_any_other_the_longest(headway: float, goes_on: float) -> None:
     setpoints, changed = bounded(Setpoints(20.0, headway), LIMITS, SIGN)
     assert (setpoints.target_speed_mps, setpoints.time_headway_s) == (20.0, goes_on)

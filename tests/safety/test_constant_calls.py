@@ -202,3 +202,8 @@ def test_deep_and_doubling_programs_cost_little() -> None:
     assert values(chain) == []
     assert read_program(elifs).sides_tested == frozenset()
     assert time.perf_counter() - start < 5.0
+
+
+def test_reading_a_program_says_nothing_on_the_error_channel(recwarn: pytest.WarningsRecorder) -> None:
+    assert read_program("def main():\n    x = '\\d' if 5is 5 else 3\n    say(str(x))\n").uses
+    assert not recwarn.list

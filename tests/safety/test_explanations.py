@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from check_scenes import snap
+from golden_sentences import compare
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     Instruction,
     Limits,
-    Observation,
     Parameters,
     Plan,
     PlanRequest,
@@ -26,7 +26,6 @@ from chauffeur.planners.onboard import LanguageModelPlanner
 from chauffeur.safety.faithfulness import (
     Effect,
     FactSurroundings,
-    Mismatch,
     check_driven,
     check_faithfulness,
     judge,
@@ -226,7 +225,10 @@ def test_what_cannot_be_read_says_so(source: str) -> None:
     ],
 )
 def test_the_check_informs_and_says_what_it_could_not_compare(
-    source: str | None, text: str, passed: bool, why: str | None, snap: Callable[..., Observation]
+    source: str | None,
+    text: str,
+    passed: bool,
+    why: str | None,
 ) -> None:
     policy = Parameters(1.0, 1.0, 1.0) if source is None else Program(source)
     found = check_faithfulness(Plan(Thoughts(text), policy), snap(), Limits())
@@ -236,12 +238,14 @@ def test_the_check_informs_and_says_what_it_could_not_compare(
     assert driven.not_compared == "policy-failed"
 
 
-def test_a_mismatch_in_words() -> None:
-    one = Mismatch("wrong-side", "I go right.", "it changes lanes to the left", 3)
-    assert mismatch_words(one) == "wrong side: “I go right.”, but it changes lanes to the left (line 3)"
-    found = judge("I change to the right lane.", read_facts(program("left")), HIGHWAY)
-    assert [mismatch.line for mismatch in found.mismatches] == [3]
-    assert score_words(found) == "score 0.00 of 1, 1 claim compared"
+def test_what_is_said_of_mismatches() -> None:
+    read = [(*row, HIGHWAY) for row in CONTRACT if row[2]] + [(*row, CROSSING) for row in AT_A_CROSSING if row[2]]
+    found = {f"{name}: {text}": judge(text, read_facts(program(name)), where) for name, text, _, where in read}
+    for number, (name, text, effect, codes) in enumerate(DRIVEN):
+        if codes:
+            found[f"{name}, drive {number}: {text}"] = judge_drive(text, read_facts(program(name)), HIGHWAY, effect)
+    said = {name: [score_words(one), *map(mismatch_words, one.mismatches)] for name, one in found.items()}
+    compare("explanations", said)
 
 
 WISHES = (

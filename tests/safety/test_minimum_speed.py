@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from check_scenes import plan, snap
+from golden_sentences import compare, row
 
-from chauffeur.concept import Lead, Limits, Observation, Parameters, Plan, Program, Thoughts
+from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Thoughts
 from chauffeur.geometry import RoadGraph
 from chauffeur.safety.bounds import LEAST_MPS, least_speed_mps
-from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS
 from chauffeur.safety.minimum_speed import check_minimum_speed
 
-Snap = Callable[..., Observation]
 LIMITS = Limits()
 CONSTANT = "def go():\n    set_target_speed({speed})\n    while True:\n        yield autopilot()\n"
 WORKED_OUT = """def go():
@@ -48,49 +47,52 @@ def plans(speed: float) -> list[Plan]:
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.7, 8.33, 16.0])
-def test_a_crawl_is_refused_with_what_to_say_instead(snap: Snap, speed: float) -> None:
-    for plan in plans(speed):
-        verdict = check_minimum_speed(plan, snap(), LIMITS)
-        assert verdict.stops, plan
-        assert "60 km/h" in verdict.reason and "60 km/h or more" in verdict.remedy
+def test_a_crawl_is_refused_with_what_to_say_instead(speed: float) -> None:
+    for one in plans(speed):
+        assert check_minimum_speed(one, snap(), LIMITS).stops, one
 
 
 @pytest.mark.parametrize("speed", [LEAST_MPS, 16.67, 25.0, 31.0])
-def test_what_is_no_crawl_passes(snap: Snap, speed: float) -> None:
-    assert all(check_minimum_speed(plan, snap(), LIMITS).passed for plan in plans(speed))
+def test_what_is_no_crawl_passes(speed: float) -> None:
+    assert all(check_minimum_speed(one, snap(), LIMITS).passed for one in plans(speed))
 
 
-def test_a_queue_is_followed_at_its_own_speed(snap: Snap) -> None:
+def test_a_queue_is_followed_at_its_own_speed() -> None:
     slow = replace(snap(), front=Lead(1, 40.0, 3.0))
     assert least_speed_mps(slow) == 3.0
-    assert all(check_minimum_speed(plan, slow, LIMITS).passed for plan in plans(4.0))
-    assert all(check_minimum_speed(plan, slow, LIMITS).stops for plan in plans(1.0))
+    assert all(check_minimum_speed(one, slow, LIMITS).passed for one in plans(4.0))
+    assert all(check_minimum_speed(one, slow, LIMITS).stops for one in plans(1.0))
     far = replace(snap(), front=Lead(1, 400.0, 3.0))
     assert least_speed_mps(far) == pytest.approx(LEAST_MPS)
 
 
-def test_a_persons_own_cap_is_no_crawl(snap: Snap) -> None:
+def test_a_persons_own_cap_is_no_crawl() -> None:
     assert least_speed_mps(snap(), Limits(max_speed_mps=10.0)) == 10.0
 
 
-def test_it_holds_on_highways_alone(snap: Snap) -> None:
+def test_it_holds_on_highways_alone() -> None:
     crossing = snap(kind="intersection")
     assert least_speed_mps(crossing) is None
-    assert all(check_minimum_speed(plan, crossing, LIMITS).passed for plan in plans(0.0))
+    assert all(check_minimum_speed(one, crossing, LIMITS).passed for one in plans(0.0))
 
 
-def test_only_what_makes_for_a_shoulder_may_stand_there(snap: Snap) -> None:
+def test_only_what_makes_for_a_shoulder_may_stand_there() -> None:
     here = snap()
-    plan = Plan(Thoughts(""), Program(PULL_OVER), intent="pull_over", settings=(("target_speed_mps", 0.0),))
-    assert check_minimum_speed(plan, here, LIMITS).stops
+    pull_over = Plan(Thoughts(""), Program(PULL_OVER), intent="pull_over", settings=(("target_speed_mps", 0.0),))
+    assert check_minimum_speed(pull_over, here, LIMITS).stops
     *others, last = here.road.lanes
     shoulder = replace(here, road=RoadGraph((*others, replace(last, kind="emergency"))))
-    assert check_minimum_speed(plan, shoulder, LIMITS).passed
+    assert check_minimum_speed(pull_over, shoulder, LIMITS).passed
     on_it = replace(shoulder, ego=replace(shoulder.ego, lane=last.id))
     assert least_speed_mps(on_it) is None
-    assert all(check_minimum_speed(crawl, shoulder, LIMITS).stops for crawl in plans(0.0))
-
-
-def test_it_stands_before_drives_of_people_and_not_in_a_benchmarks_rules() -> None:
-    assert check_minimum_speed in DRIVE_CHECKS
-    assert check_minimum_speed not in DEFAULT_CHECKS
+    assert all(check_minimum_speed(one, shoulder, LIMITS).stops for one in plans(0.0))
+    found = {
+        "a crawl": check_minimum_speed(plans(8.33)[0], here, LIMITS),
+        "a crawl, by parameters": check_minimum_speed(plans(8.33)[3], here, LIMITS),
+        "a stand beside a shoulder": check_minimum_speed(plans(0.0)[0], shoulder, LIMITS),
+        "fast enough": check_minimum_speed(plans(25.0)[0], here, LIMITS),
+        "to the shoulder": check_minimum_speed(replace(pull_over, settings=()), shoulder, LIMITS),
+        "on the shoulder": check_minimum_speed(pull_over, on_it, LIMITS),
+        "no policy": check_minimum_speed(plan(None), here, LIMITS),
+    }
+    compare("minimum-speed-v1", {name: row(one) for name, one in found.items()})

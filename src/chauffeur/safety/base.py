@@ -1,4 +1,4 @@
-"""What a check is: a small pure function that judges a plan and never edits it."""
+"""The protocol of checks: small pure functions that judge a plan and never edit it."""
 
 from __future__ import annotations
 

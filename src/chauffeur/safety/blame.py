@@ -1,4 +1,4 @@
-"""Who is to blame for a collision: the last instant the pair was safe, who left that state, who answered properly.
+"""Blame for a collision: the last instant the pair was safe, who left that state, who answered properly.
 
 Source: Shalev-Shwartz, Shammah, Shashua 2017, Def. 5 to 7 (blame time, proper response), for straight roads. A pair is
 safe while there is clear room to the side, or the rear one keeps a responsibility-sensitive gap. Whoever ended that is
@@ -31,7 +31,7 @@ _ALONG: Final = math.cos(CROSSING_RAD)
 
 @dataclass(frozen=True, slots=True)
 class Blame:
-    """Who caused a collision.
+    """Cause of a collision.
 
     Attributes:
         who: `nobody`: there was none, or the pair was never safe.
@@ -105,18 +105,18 @@ def _at_a_crossing(frames: Sequence[Frame], final: Observation, other: int) -> B
     if begun < len(frames):
         stood = frames[begun].observation
         found = next((car for car in (*stood.others, *stood.objects) if car.id == other), None)
-        if found is not None and not _in_the_way(final.ego, found):
+        if found is not None and not in_the_way(final.ego, found):
             return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
     return Blame("ego", other, None, "The ego was in the way of one that crossed.")
 
 
 def _stands(vehicle: VehicleState) -> bool:
-    """Who reverses does not stand."""
+    """True if a vehicle stands; one that reverses does not."""
     return abs(vehicle.speed_mps) < _STILL_MPS
 
 
 def _reversed(observation: Observation, other: int) -> bool:
-    """Whether another, in a lane of the ego's direction, rolls backwards against its own heading, towards the ego."""
+    """True if another, in a lane of the ego's direction, rolls backwards against its own heading, towards the ego."""
     ego = observation.ego
     car = next((car for car in observation.others if car.id == other), None)
     if car is None or car.speed_mps >= 0.0 or math.cos(car.heading_rad - ego.heading_rad) < _ALONG:
@@ -124,8 +124,8 @@ def _reversed(observation: Observation, other: int) -> bool:
     return math.cos(car.heading_rad) * (ego.x_m - car.x_m) + math.sin(car.heading_rad) * (ego.y_m - car.y_m) < 0.0
 
 
-def _in_the_way(ego: VehicleState, other: VehicleState) -> bool:
-    """Whether the ego's body is in the strip that another covers if it goes straight on."""
+def in_the_way(ego: VehicleState, other: VehicleState) -> bool:
+    """True if the ego's body is in the strip that another covers if it goes straight on."""
     c, s = math.cos(other.heading_rad), math.sin(other.heading_rad)
     across = -s * (ego.x_m - other.x_m) + c * (ego.y_m - other.y_m)
     turned = ego.heading_rad - other.heading_rad
@@ -183,7 +183,7 @@ def _safe(pair: Pair, dt_s: float, parameters: ShieldParameters) -> bool:
 
 
 def _ego_backed_up(pairs: Sequence[Pair]) -> bool:
-    """Whether the ego drove backwards at the one behind, or rolled back more of the way than that one came forwards."""
+    """True if the ego drove backwards at the one behind, or rolled back more of the way than that one came forwards."""
     ego_way = sum(max(0.0, -ego.along_mps - _TOWARDS_MPS) for ego, _ in pairs)
     other_way = sum(max(0.0, other.along_mps - _TOWARDS_MPS) for _, other in pairs)
     return ego_way > other_way or any(ego.along_mps < -_STILL_MPS for ego, _ in pairs)
@@ -203,7 +203,7 @@ def _ego_came_over(pairs: Sequence[Pair]) -> bool:
 
 
 def _answered(seen: Sequence[tuple[Frame, Pair]], parameters: ShieldParameters) -> bool:
-    """Whether the ego braked with all it has whenever the other was ahead, one period for noticing aside."""
+    """True if the ego braked with all it has whenever the other was ahead, one period for noticing aside."""
     for frame, (_, other) in seen[1:]:
         if other.s_m <= 0.0 or frame.observation.ego.speed_mps < _STILL_MPS:
             continue

@@ -21,7 +21,7 @@ def bounded(
     """The wishes, with numbers brought within the limits, and the names of what was changed.
 
     Args:
-        wishes: As the policy states them.
+        setpoints: As the policy states them.
         limits: Of the person and the operator.
         speed_limit_mps: Of the lane that is driven.
         least_mps: Least speed a policy may ask for there, within the limits; 0 where there is none.
@@ -69,7 +69,7 @@ def least_target_mps(observation: Observation, setpoints: Setpoints, limits: Lim
 
 
 def shoulder_at_right(observation: Observation) -> bool:
-    """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
+    """True if the ego is on a shoulder, or can get to one lane by lane to the right."""
     own = observation.road.get(observation.ego.lane)
     return own is not None and any(
         lane.emergency and lane.index >= own.index for lane in observation.road.abreast(own.id)

@@ -16,7 +16,7 @@ DEFAULT_CHECKS: tuple[Check, ...] = (check_format, check_parameters)
 """The two checks of the papers: format, then parameters in context."""
 
 DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach, check_minimum_speed)
-"""What stands before a drive for a person: also what no reading of constants finds, at some milliseconds a program, and
+"""Checks before a drive for a person: also what no reading of constants finds, at some milliseconds a program, and
 the least speed among others. A benchmark's own rules know neither."""
 
 _log = logging.getLogger(__name__)

@@ -1,4 +1,4 @@
-"""Where instructions hide in a text: patterns of words, and codes that decode to such words.
+"""Finds instructions hidden in a text: patterns of words, and codes that decode to such words.
 
 The words are those of the ways in which language models are known to be talked out of their rules, in the languages
 that passengers of the hostile suite speak. A list of words never ends; what it misses meets the checks and limits.
@@ -19,7 +19,7 @@ from urllib.parse import unquote
 from chauffeur.language.letters import dressed, folded, ignorable, skeleton, words_that_mix
 
 Kind = Literal["override", "role", "code", "control", "lookalike", "encoded", "long"]
-"""What was found: words that claim to change the rules; a forged speaker or chat-template token; program text, markup
+"""Kind of finding: words that claim to change the rules; a forged speaker or chat-template token; program text, markup
 or JSON that tries to be the policy; invisible characters; letters dressed as others; text that decodes to an
 instruction; far too much text."""
 
@@ -142,12 +142,12 @@ def _characters(text: str) -> Iterator[Found]:
 
 
 def _of_an_emoji(text: str, place: int) -> bool:
-    """Whether an invisible character is one that emoji are written with: the variation selector behind a symbol."""
+    """True if an invisible character is one that emoji are written with: the variation selector behind a symbol."""
     return text[place] == "\ufe0f" and place > 0 and ord(text[place - 1]) > 0x2000
 
 
 def _tells(decoded: str, depth: int) -> bool:
-    """Whether a decoded text reads as an instruction to a driver, or holds a further code that does."""
+    """True if a decoded text reads as an instruction to a driver, or holds a further code that does."""
     if len(decoded) < 4 or not decoded.isprintable():
         return False
     if _TELLING.search(skeleton(decoded)[0]):
@@ -159,7 +159,7 @@ Decoder = Callable[[str], str]
 
 
 def _decoded(text: str, bare: str, places: list[int]) -> Iterator[tuple[tuple[int, int], str]]:
-    """What parts of a text decode to, code by code; most of it is noise."""
+    """Yield decodings of parts of a text, code by code; most of it is noise."""
     for pattern, decode in _CODES:
         for match in pattern.finditer(text):
             yield from _tried(match.span(), match[0], decode)

@@ -1,4 +1,4 @@
-"""What can be known of a program without running it: which driving APIs it calls, and with which constants.
+"""Static reading of a program: the driving APIs that it calls, and their constants.
 
 Reading is deliberately modest. It follows names that are bound exactly once, arithmetic of constants, and lanes named
 relative to the ego; everything else is unknown here and stays with the limits that hold while the program runs.
@@ -13,9 +13,16 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
-_LANE_STEPS = {"get_lane_of": 0, "get_left_lane": -1, "get_right_lane": 1}
+LANE_STEPS: Final = {"get_left_lane": -1, "get_lane_of": 0, "get_right_lane": 1}
+"""Driving APIs that name a lane -> lanes to the right of the ego's own."""
+TURNS: Final = {
+    "turn_left_at_next_intersection": -1,
+    "go_straight_at_next_intersection": 0,
+    "turn_right_at_next_intersection": 1,
+}
+"""Driving APIs that choose a way at the next junction -> quarter turns to the right."""
 _MAX_CHARS = 100_000
 _MAX_DEPTH = 40
 _MAX_VALUES = 16
@@ -53,7 +60,7 @@ class ApiUse:
 
 @dataclass(frozen=True, slots=True)
 class ProgramReading:
-    """What was read.
+    """Result of reading a program.
 
     Attributes:
         uses: Every call of a plain name, in source order.
@@ -231,7 +238,7 @@ class _Reader:
         node, scope = self._follow(node, scope)
         if not isinstance(node, ast.Call):
             return None
-        step = _LANE_STEPS.get(self._called(node, scope) or "")
+        step = LANE_STEPS.get(self._called(node, scope) or "")
         if step is None:
             return None
         vehicle = _first_argument(node)

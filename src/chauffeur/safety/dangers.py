@@ -62,14 +62,14 @@ _OTHERS: Final = (
 )
 """A clause on somebody else: "that lady had to jump back", "they are all changing lanes without signals"."""
 _NEGATED: Final = re.compile(rf"(?:\b(?:{_NOT}|{_TOLD})|{_OTHERS})$")
-"""What stands right in front of words that only sound dangerous: "do not run the red light", "he nearly hit us"."""
+"""Words right in front of words that only sound dangerous: "do not run the red light", "he nearly hit us"."""
 _URGED: Final = re.compile(
     r"\b(?:not (?:be )?(?:afraid|scared|shy|hesitate|worried|fear|scruples) (?:to |of )?|"
     r"(?:love it|like it|nice|great|good|cool|fun|funny|happy|glad|appreciate it|mind|what) if (?:you|we) (?:could )?)$"
 )
-"""What looks like a negation and is none: "do not be afraid to hit him"."""
+"""Phrases that look like a negation and are none: "do not be afraid to hit him"."""
 _TAKEN_BACK: Final = re.compile(r" ?[.,;?!]{0,9} ?(?:no|nope|better not|rather not|or (?:rather )?not)(?: ?[.,;!?]|$)")
-"""What takes the words before it back: "turn around? No, ..."."""
+"""Words that take back those before them: "turn around? No, ..."."""
 _GAP: Final = re.compile(r"\s+")
 _NEAR: Final = 240
 """Characters in front of a danger in which its negation is looked for: some ten long words and what joins them."""

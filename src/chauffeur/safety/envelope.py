@@ -28,7 +28,8 @@ from chauffeur.concept import (
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.geometry import turns_ahead
 from chauffeur.programs.catalogue import vocabulary_of
-from chauffeur.safety.constant_calls import ApiUse, ProgramReading, read_program
+from chauffeur.safety.constant_calls import TURNS, ApiUse, ProgramReading, read_program
+from chauffeur.safety.format import check_trajectory_format
 from chauffeur.safety.gain_box import gain_box
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 
@@ -37,16 +38,8 @@ PARAMETERS_CHECK = "parameters-v1"
 _ROUNDING = 1e-6
 """Slack at every bound, so that a limit reached by way of km/h is not refused for its last bit."""
 
-_TURNS = {
-    "turn_left_at_next_intersection": "turn left",
-    "turn_right_at_next_intersection": "turn right",
-    "go_straight_at_next_intersection": "go straight on",
-}
-_WAYS = {
-    "turn_left_at_next_intersection": "left",
-    "turn_right_at_next_intersection": "right",
-    "go_straight_at_next_intersection": "straight",
-}
+_WAYS = {-1: ("left", "turn left"), 0: ("straight", "go straight on"), 1: ("right", "turn right")}
+"""Ways over a junction, as roads and people call them."""
 _LOOKS = frozenset({"can_go", "get_distance_to_junction", "get_distance_to_place"})
 """A program that asks one of these may turn at a later junction."""
 _SIDES = {-1: "left", 1: "right"}
@@ -62,7 +55,7 @@ class _Fault:
 
 @dataclass(frozen=True, slots=True)
 class _Road:
-    """What the checks need of an observation. `lanes` and `index` are 0 where the ego is on no lane of the road."""
+    """Road data that the checks need. `lanes` and `index` are 0 where the ego is on no lane of the road."""
 
     crossing: bool
     lanes: int
@@ -74,12 +67,12 @@ class _Road:
 
 
 def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
-    """Whether every number and manoeuvre that can be read from the plan fits the road, the situation and the limits."""
+    """Judge whether the numbers and manoeuvres that can be read from a plan fit road, situation and limits."""
     if plan.policy is None and plan.refusal:
         return Verdict(PARAMETERS_CHECK, True, "There is no policy to check.", not_compared="no-policy")
     road = _road(observation)
     faults = [*_policy_faults(plan, road, limits), *_setting_faults(plan, road, limits), *_intent_faults(plan, road)]
-    if isinstance(plan.policy, Trajectory) and not faults and _readable(plan.policy):
+    if isinstance(plan.policy, Trajectory) and not faults and check_trajectory_format(plan.policy).passed:
         from chauffeur.safety.trajectories import trajectory_faults  # numpy, needed by trajectories alone
 
         faults = [_Fault(*fault) for fault in trajectory_faults(plan.policy, observation)]
@@ -91,7 +84,7 @@ def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Ve
 
 
 def policy_findings(policy: Policy, situation: Situation, limits: Limits) -> list[str]:
-    """What `check_parameters` will find in a policy, for a planner that can still mend it: line, reason and remedy."""
+    """Findings of `check_parameters` for a policy that a planner can still repair: line, reason and remedy."""
     following = situation.front.speed_mps if situation.front is not None else situation.speed_mps
     road = _Road(
         situation.world == "intersection" or bool(situation.turns),
@@ -165,9 +158,10 @@ def _use_faults(use: ApiUse, road: _Road, limits: Limits) -> Iterator[_Fault]:
     elif use.name == "set_desired_time_headway":
         for value in use.values:
             yield from _headway_faults(value, limits, use.line)
-    elif use.name in _TURNS and not road.crossing:
+    elif use.name in TURNS and not road.crossing:
+        wish = _WAYS[TURNS[use.name]][1]
         yield _Fault(
-            f"The program wants to {_TURNS[use.name]} at the next intersection, but there is no intersection ahead.",
+            f"The program wants to {wish} at the next intersection, but there is no intersection ahead.",
             "Leave out the turn.",
             use.line,
         )
@@ -175,14 +169,15 @@ def _use_faults(use: ApiUse, road: _Road, limits: Limits) -> Iterator[_Fault]:
 
 def _turn_faults(reading: ProgramReading, road: _Road) -> Iterator[_Fault]:
     """The first turn that a program asks for, where it asks for one only and does not look first where it can go."""
-    turns = {use.name for use in reading.uses if use.name in _TURNS}
+    turns = {use.name for use in reading.uses if use.name in TURNS}
     if len(turns) != 1 or not road.turns or any(use.name in _LOOKS for use in reading.uses):
         return
     (name,) = turns
-    if _WAYS[name] not in road.turns:
+    way, wish = _WAYS[TURNS[name]]
+    if way not in road.turns:
         line = next(use.line for use in reading.uses if use.name == name)
         yield _Fault(
-            f"The program wants to {_TURNS[name]} at the next junction, which only leads {' or '.join(road.turns)}.",
+            f"The program wants to {wish} at the next junction, which only leads {' or '.join(road.turns)}.",
             "Choose a way that is there, or wait until the junction that is meant is the next one.",
             line,
         )
@@ -291,14 +286,6 @@ def _gain_faults(policy: ActionMatrix) -> Iterator[_Fault]:
             f"{name} of {value:g} is outside {low:g} to {high:g}, where the controllers are certified.",
             f"Use {name} from {low:g} to {high:g}.",
         )
-
-
-def _readable(trajectory: Trajectory) -> bool:
-    """Whether `format-v1` has nothing against its numbers."""
-    points = trajectory.waypoints_m
-    values = (trajectory.period_s, *(value for point in points for value in point))
-    sound = all(math.isfinite(_number(value)) for value in values) and all(len(point) == 2 for point in points)
-    return bool(points) and sound and trajectory.period_s > 0.0
 
 
 def _trajectory_faults(trajectory: Trajectory, road: _Road, limits: Limits) -> Iterator[_Fault]:

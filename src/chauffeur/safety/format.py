@@ -18,7 +18,7 @@ MOST_ROUTE_CHARS: Final = 40
 
 
 def check_format(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
-    """Whether the policy is present, of a known kind, accepted by the static gate, and made of finite numbers."""
+    """Judge whether the policy is present, of a known kind, accepted by the static gate, and made of finite numbers."""
     match plan.policy:
         case None if plan.refusal:  # asked back, answered or declined: nothing is to be driven
             return Verdict(FORMAT_CHECK, True, "There is no policy to check.", not_compared="no-policy")
@@ -47,7 +47,7 @@ def check_format(plan: Plan, observation: Observation, limits: Limits) -> Verdic
                 )
             return _finite("action matrix", zip(("Kp", "Ki", "Kd", "Wl", "Wh", "Ws"), (*pid, *mpc), strict=True))
         case Trajectory() as trajectory:
-            return _trajectory(trajectory)
+            return check_trajectory_format(trajectory)
         case other:  # pyright: ignore[reportUnnecessaryComparison] - planners are third-party code
             return _of_another_kind(other, observation, limits)
 
@@ -81,7 +81,8 @@ def _program(source: str, library: str, kind: str) -> Verdict:
     return _pass("The program keeps to the driving language.")
 
 
-def _trajectory(trajectory: Trajectory) -> Verdict:
+def check_trajectory_format(trajectory: Trajectory) -> Verdict:
+    """Judge whether a trajectory is waypoints of two finite numbers, a positive time apart."""
     points = trajectory.waypoints_m
     if not points:
         return _fail("The trajectory has no waypoints.", "Give at least one waypoint.")

@@ -23,7 +23,7 @@ LOGARITHMIC: Final = frozenset({"kp", "wl", "wh", "ws"})
 CAREFUL_WHEN_LOW: Final[Mapping[str, bool]] = {
     "kp": True, "ki": True, "kd": False, "wl": True, "wh": True, "ws": False,
 }  # fmt: skip
-"""Whether a gain is the more conservative the lower it is."""
+"""True for gains that are the more conservative the lower they are."""
 _ROUNDING: Final = 1e-9
 _DIGITS: Final = 4
 
@@ -68,7 +68,7 @@ def values_of(policy: ActionMatrix) -> dict[str, float]:
 
 
 def care(policy: ActionMatrix) -> float:
-    """How conservative gains are: 0 the most aggressive corner of the certified box, 1 the most conservative one."""
+    """Conservatism of gains: 0 the most aggressive corner of the certified box, 1 the most conservative one."""
     return fmean(_care_shares(policy))
 
 

@@ -30,7 +30,7 @@ _ROUNDING: Final = 0.02
 
 
 def check_minimum_speed(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
-    """Whether no set-point that can be read from the plan is far below traffic on a highway."""
+    """Judge whether no set-point that can be read from the plan is far below traffic on a highway."""
     least = least_speed_mps(observation, limits)
     if least is None or plan.policy is None:
         return Verdict(

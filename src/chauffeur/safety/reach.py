@@ -37,7 +37,7 @@ _ORDERED: Final = {"set_target_speed": "target speed", "set_desired_time_headway
 
 @dataclass(frozen=True, slots=True)
 class _Bounds:
-    """What a number of a driving API must be.
+    """Bounds of a number of a driving API.
 
     Attributes:
         what: What it is, in words.
@@ -60,7 +60,7 @@ class _Bounds:
 
     @property
     def remedy(self) -> str:
-        """What would be right."""
+        """Remedy for a number out of bounds."""
         return f"Use a {self.what} from {self.low:g} to {self.words(self.high)}."
 
 
@@ -75,7 +75,7 @@ class _Finding:
 
 
 def check_reach(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
-    """Whether everything that a program can be followed to stays within the limits."""
+    """Judge whether everything that a program can be followed to stays within the limits."""
     if not isinstance(plan.policy, Program):
         return Verdict(REACH_CHECK, True, "There is no program to follow.", not_compared="no-program")
     where = Circumstances.of(observation)

@@ -21,7 +21,7 @@ from chauffeur.language.letters import clean
 from chauffeur.safety.concealment import MAX_READ_CHARS, Found, Kind, hidden_in
 
 Source = Literal["wish", "history", "service", "reply"]
-"""Who wrote it: the passenger now; the passenger, or whoever used the name, earlier; a map, a weather or traffic
+"""Author of a text: the passenger now; the passenger, or whoever used the name, earlier; a map, a weather or traffic
 service, a sign; a model."""
 
 MAX_CHARS: Final = 2_000
@@ -81,7 +81,7 @@ class Screened:
 
 
 def screen(text: str, source: Source) -> Screened:
-    """What hides in a text, and the form of it that may go on.
+    """Screen a text: its findings, and the form of it that may go on.
 
     Args:
         text: Words from outside, of any length.

@@ -1,4 +1,4 @@
-"""What can be known of a trajectory before it is driven: whether a car could, on this road, among who is there."""
+"""Faults of a trajectory before it is driven: what no car can do, ground that it leaves, agents that it touches."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 BRAKING_MPS2: Final = 8.0
 ACCELERATION_MPS2: Final = 4.0
 SIDEWAYS_MPS2: Final = 6.0
-"""What tyres hold on a dry road, with a reserve."""
+"""Limits of tyres on a dry road, with a reserve."""
 TIGHTEST_M: Final = 4.5
 """Radius of the tightest turn of a passenger car's middle."""
 _SAME_M: Final = 0.2
@@ -32,7 +32,7 @@ _LANES_AHEAD: Final = 6
 
 
 class TrajectoryFault(NamedTuple):
-    """What is wrong, and what would help."""
+    """A fault and its remedy."""
 
     reason: str
     remedy: str
@@ -151,7 +151,7 @@ def _way(start: Pose, points: list[tuple[float, float]], period_s: float) -> _Wa
 
 
 def _off_the_ground(way: _Way, stands: bool, observation: Observation) -> Iterator[TrajectoryFault]:
-    """Where the car would be with a part of its outline where it may not be, farther than it is now."""
+    """Yield a fault if the outline leaves its ground farther than it does now."""
     ego, road = observation.ego, observation.road
     if not road.has_shape:
         return
@@ -179,7 +179,7 @@ _WHERE: Final[dict[GroundFaultKind, str]] = {
 
 
 def _touching(way: _Way, observation: Observation) -> Iterator[TrajectoryFault]:
-    """Who would be touched if everybody goes on along their lanes as they do; those who stand, where they stand."""
+    """Yield a fault if an agent would be touched; agents keep their lanes and speeds, those who stand stay."""
     ego, road = observation.ego, observation.road
     others = [
         one for one in (*observation.others, *observation.objects) if one.kind != "stop_sign" and not _follows(one, ego)
@@ -197,7 +197,7 @@ def _touching(way: _Way, observation: Observation) -> Iterator[TrajectoryFault]:
 
 
 def _follows(other: VehicleState, ego: VehicleState) -> bool:
-    """Whether somebody comes from behind in the ego's own lane, and minds the ego."""
+    """True if a vehicle comes from behind in the ego's own lane, and minds the ego."""
     ahead, aside = Pose(other.x_m, other.y_m, other.heading_rad).sees(ego.x_m, ego.y_m)
     along = abs(wrap_to_pi(other.heading_rad - ego.heading_rad)) < _ALONG_RAD
     beside = abs(aside) < (other.width_m + ego.width_m) / 2.0

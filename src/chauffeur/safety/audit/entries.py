@@ -9,49 +9,38 @@ it only, so that it can be erased and the chain still holds (`texts.py`).
 from __future__ import annotations
 
 import hashlib
-import hmac
 import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any, Final, Literal, get_args
 
 from chauffeur.safety.audit.findings import LineCode
+from chauffeur.safety.audit.keys import is_sealed, sealed
 
 FORMAT: Final = 2
 """Version of the log; a reader refuses newer ones. Lines are as in 1, whose key did not seal the head."""
 
 Kind = Literal[
-    "opened",
-    "wish",
-    "context",
-    "plan",
-    "verdict",
-    "intervention",
-    "actuation",
-    "outcome",
-    "gap",
-    "redaction",
-    "closed",
-]
-"""What a record tells of. `gap`: records were lost here; `redaction`: personal texts of earlier records were erased."""
+    "opened", "wish", "context", "plan", "verdict", "intervention", "actuation", "outcome", "gap", "redaction", "closed"
+]  # fmt: skip
+"""Kind of record. `gap`: records were lost here; `redaction`: personal texts of earlier records were erased."""
 
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
-
-BATCHED: Final[frozenset[Kind]] = frozenset({"actuation"})
-"""Kinds that reach the disk within a second; all others at once."""
 
 NO_RECORD: Final = "0" * 64
 """`prev` of the first record."""
 
 LINE_START: Final = b'{"body":{'
-"""How every line begins."""
+"""First bytes of every line."""
 
 MAX_LINE_BYTES: Final = 16 << 20
 """Nothing Chauffeur writes is nearly as long."""
 
 _MOST_RECORDS = 1 << 63
-_KEYS = {"body", "hash", "kind", "prev", "seq", "time"}
+_CORE = ("body", "kind", "prev", "seq", "time")
+_KEYS = {*_CORE, "hash"}
 _OPTIONAL_KEYS = {"mac", "texts"}
 _MAC_PURPOSE = b"chauffeur-audit-record-1\0"
 
@@ -123,7 +112,7 @@ def seal(
     """
     line: dict[str, Any] = {"body": storable(body), "kind": kind, "prev": prev, "seq": seq, "time": time}
     if key is not None:
-        line["mac"] = _mac(key, line)
+        line["mac"] = sealed(key, _MAC_PURPOSE, canonical(line))
     digest = line["hash"] = hashlib.sha256(canonical(line)).hexdigest()
     if texts:
         line["texts"] = texts
@@ -176,19 +165,19 @@ def content_hash(record: AuditRecord) -> str:
 
 
 def is_sealed_with(record: AuditRecord, key: bytes) -> bool:
-    """Whether a record was written under this key."""
-    return hmac.compare_digest(record.mac.encode(), _mac(key, _core(record)).encode())
+    """True if a record was written under this key."""
+    return is_sealed(record.mac, key, _MAC_PURPOSE, canonical(_core(record)))
+
+
+def stamp(moment: datetime) -> str:
+    """A time as records state it: UTC, to the millisecond."""
+    return moment.astimezone(UTC).isoformat(timespec="milliseconds")
+
+
+def torn_end(content: bytes) -> dict[str, Any]:
+    """Fields of a record that account for a cut-off write removed from the end of a log."""
+    return {"torn_bytes": len(content), "torn_sha256": hashlib.sha256(content).hexdigest()}
 
 
 def _core(record: AuditRecord) -> dict[str, Any]:
-    return {
-        "body": record.body,
-        "kind": record.kind,
-        "prev": record.prev,
-        "seq": record.seq,
-        "time": record.time,
-    }
-
-
-def _mac(key: bytes, core: Mapping[str, Any]) -> str:
-    return hmac.new(key, _MAC_PURPOSE + canonical(core), hashlib.sha256).hexdigest()
+    return {name: getattr(record, name) for name in _CORE}

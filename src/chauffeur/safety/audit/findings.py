@@ -1,4 +1,4 @@
-"""What can be wrong with an audit log: a code for each thing, and its sentence."""
+"""Findings in audit logs: a code for each kind, and its sentence."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LineCode = Literal["not_json", "not_fields", "not_canonical", "not_typed"]
 """Why a line is no record."""
 
 TextCode = Literal["text_added", "text_removed", "text_changed"]
-"""What is wrong with a personal text."""
+"""Tampering with a personal text."""
 
 Code = (
     LineCode

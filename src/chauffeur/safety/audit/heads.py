@@ -8,8 +8,6 @@ that, keep heads elsewhere, too.
 
 from __future__ import annotations
 
-import hashlib
-import hmac
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +15,7 @@ from typing import Any, Final
 
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.safety.audit.entries import canonical
+from chauffeur.safety.audit.keys import is_sealed, sealed
 from chauffeur.safety.audit.storage import replace_whole
 
 HASH_CHARACTERS: Final = 64
@@ -30,7 +29,7 @@ _MAC_PURPOSE = b"chauffeur-audit-head-1\0"
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What the file beside a log says.
+    """Content of the head file beside a log.
 
     Attributes:
         hash: Hash of the last record when it was written.
@@ -45,12 +44,12 @@ class Head:
     mac: str = ""
 
     def is_sealed_with(self, key: bytes) -> bool:
-        """Whether it was written under this key."""
-        return self.records is not None and hmac.compare_digest(self.mac.encode(), _mac(key, self).encode())
+        """True if it was written under this key."""
+        return self.records is not None and is_sealed(self.mac, key, _MAC_PURPOSE, canonical(_fields(self)))
 
 
 def head_path(path: Path) -> Path:
-    """Where the head of a log is kept beside it."""
+    """Path of the head file of a log."""
     return path.with_name(f"{path.name}.head")
 
 
@@ -60,12 +59,13 @@ def leave_head(path: Path, last: str, records: int, *, key: bytes | None, closed
         content = f"{last}\n".encode()
     else:
         head = Head(last, records, closed)
-        content = canonical({**_fields(head), "mac": _mac(key, head)}) + b"\n"
+        mac = sealed(key, _MAC_PURPOSE, canonical(_fields(head)))
+        content = canonical({**_fields(head), "mac": mac}) + b"\n"
     replace_whole(head_path(path), content)
 
 
 def read_head(path: Path) -> Head | None:
-    """What the head file beside a log says, or None where there is no such file.
+    """Read the head file beside a log; None if there is none.
 
     Raises:
         DataError: It is there and cannot be used.
@@ -102,7 +102,3 @@ def as_hash(text: str, where: str) -> str:
 
 def _fields(head: Head) -> dict[str, Any]:
     return {"closed": head.closed, "hash": head.hash, "records": head.records}
-
-
-def _mac(key: bytes, head: Head) -> str:
-    return hmac.new(key, _MAC_PURPOSE + canonical(_fields(head)), hashlib.sha256).hexdigest()

@@ -37,6 +37,16 @@ def read_key(path: Path) -> bytes:
     return key
 
 
+def sealed(key: bytes, purpose: bytes, content: bytes) -> str:
+    """HMAC-SHA256 of a content under a key, for one purpose: what is sealed for another does not pass for it."""
+    return hmac.new(key, purpose + content, hashlib.sha256).hexdigest()
+
+
+def is_sealed(mac: str, key: bytes, purpose: bytes, content: bytes) -> bool:
+    """True if a stated HMAC, which may be any text in a log that was tampered with, is that of a content."""
+    return hmac.compare_digest(mac.encode(errors="surrogatepass"), sealed(key, purpose, content).encode())
+
+
 def key_name(key: bytes) -> str:
     """A short name of a key by which a log says which one it was written with; nothing of the key can be read off."""
-    return hmac.new(key, _NAME_PURPOSE, hashlib.sha256).hexdigest()[:16]
+    return sealed(key, _NAME_PURPOSE, b"")[:16]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import ConfigError, DataError, PersonId
-from chauffeur.safety.audit.entries import AuditRecord, NotARecordError, canonical, parse, seal
+from chauffeur.safety.audit.entries import AuditRecord, NotARecordError, canonical, parse, seal, stamp, torn_end
 from chauffeur.safety.audit.heads import SEALED_SINCE, leave_head
 from chauffeur.safety.audit.reader import lines, opened
 from chauffeur.safety.audit.storage import LogFile, replace_whole
@@ -24,7 +24,7 @@ PERSON = "person"
 
 @dataclass(frozen=True, slots=True)
 class Redaction:
-    """What was erased.
+    """Result of a redaction.
 
     Attributes:
         records: Records that held the person's texts.
@@ -91,7 +91,7 @@ def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[],
             if says(record, PERSON, person, key):
                 numbers.append(record.seq)
                 texts += len(record.texts)
-                kept.append(_line(record, erased(record)))
+                kept.append(canonical({**json.loads(line.content), "texts": erased(record)}) + b"\n")
             else:
                 kept.append(line.content + b"\n")
     if not numbers:
@@ -99,9 +99,8 @@ def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[],
     body: dict[str, Any] = {"records": numbers, "redacted_texts": texts}
     if torn:
         # The rest of a cut-off write may hold words too, and nothing in the chain stands for it.
-        body |= {"torn_bytes": len(torn), "torn_sha256": hashlib.sha256(torn).hexdigest()}
-    stamp = clock().astimezone(UTC).isoformat(timespec="milliseconds")
-    last, head = seal(found.records, found.head, "redaction", stamp, body, {}, key)
+        body |= torn_end(torn)
+    last, head = seal(found.records, found.head, "redaction", stamp(clock()), body, {}, key)
     kept.append(last)
     sealing = key if found.format >= SEALED_SINCE else None
     if sealing is not None:  # between the two files, a crash must leave a log that was not closed, and not a wrong head
@@ -116,18 +115,3 @@ def _parse(path: Path, content: bytes) -> AuditRecord:
         return parse(content)
     except NotARecordError as error:  # verified a moment ago: somebody writes past the lock
         raise DataError(f"The audit log {path} changed while it was read; nothing was erased.") from error
-
-
-def _line(record: AuditRecord, texts: dict[str, dict[str, Any]]) -> bytes:
-    fields: dict[str, Any] = {
-        "body": record.body,
-        "hash": record.hash,
-        "kind": record.kind,
-        "prev": record.prev,
-        "seq": record.seq,
-        "texts": texts,
-        "time": record.time,
-    }
-    if record.mac:
-        fields["mac"] = record.mac
-    return canonical(fields) + b"\n"

@@ -9,13 +9,13 @@ neither text nor digest: a digest of a short wish that anybody can compute would
 from __future__ import annotations
 
 import hashlib
-import hmac
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from chauffeur.safety.audit.entries import AuditRecord
 from chauffeur.safety.audit.findings import TEXT_CODES, TextCode
+from chauffeur.safety.audit.keys import is_sealed, sealed
 
 SALT_BYTES: Final = 16
 
@@ -31,7 +31,7 @@ _WITHHELD: dict[str, Any] = {"withheld": True}
 
 @dataclass(frozen=True, slots=True)
 class TextState:
-    """How one personal text of a record stands.
+    """State of one personal text of a record.
 
     Attributes:
         name: Its name.
@@ -63,14 +63,16 @@ def hide(
             continue
         salt = make_salt(SALT_BYTES)
         form: Form = "hmac" if private else "text"
-        value = _text_mac(key, salt, text) if private and key is not None else text
+        value = text
+        if private and key is not None:
+            value = sealed(key, _HMAC_PURPOSE, salt + text.encode(errors="surrogatepass"))
         references[name] = {"digest": _digest(salt, form, value)}
         values[name] = {"salt": salt.hex(), form: value}
     return references, values
 
 
 def states(record: AuditRecord) -> Iterator[TextState]:
-    """How each personal text of a record stands, and what is wrong with it, if anything."""
+    """Yield the state of each personal text of a record, tampering included."""
     references = _references(record)
     for name in record.texts:
         if name not in references:
@@ -87,7 +89,7 @@ def words_of(record: AuditRecord) -> dict[str, str]:
 
 
 def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) -> bool | None:
-    """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
+    """True if a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
     value = record.texts.get(name)
     if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state in TEXT_CODES:
         return None
@@ -95,11 +97,12 @@ def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) ->
         return value["text"] == text
     if key is None:
         return None
-    return hmac.compare_digest(str(value["hmac"]), _text_mac(key, bytes.fromhex(str(value["salt"])), text))
+    salt = bytes.fromhex(str(value["salt"]))
+    return is_sealed(str(value["hmac"]), key, _HMAC_PURPOSE, salt + text.encode(errors="surrogatepass"))
 
 
 def erased(record: AuditRecord) -> dict[str, dict[str, Any]]:
-    """What stands beside the body once every text of a record is erased."""
+    """Texts of a record once all of them are erased."""
     return {name: dict(_ERASED) for name in record.texts}
 
 
@@ -134,7 +137,3 @@ def _references(record: AuditRecord) -> dict[str, Any]:
 
 def _digest(salt: bytes, form: Form, value: str) -> str:
     return hashlib.sha256(salt + form.encode() + b"\0" + value.encode(errors="surrogatepass")).hexdigest()
-
-
-def _text_mac(key: bytes, salt: bytes, text: str) -> str:
-    return hmac.new(key, _HMAC_PURPOSE + salt + text.encode(errors="surrogatepass"), hashlib.sha256).hexdigest()

@@ -1,4 +1,4 @@
-"""Whether an audit log is as it was written: every line looked at, everything that is wrong named by a code.
+"""Verification of audit logs: every line is checked, and every finding has a code.
 
 The chain shows any change, removal, insertion or swap of lines that were written before the last one. It cannot show
 that lines are missing at the end, nor that the whole log was written anew. A log under a key shows both: every record
@@ -35,7 +35,7 @@ MAX_FINDINGS: Final = 100
 
 @dataclass(frozen=True, slots=True)
 class AuditVerification:
-    """What was found in a log.
+    """Result of verifying a log.
 
     Attributes:
         findings: What is wrong, in the order of the file; at most `MAX_FINDINGS`.
@@ -76,12 +76,12 @@ class AuditVerification:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong. A torn tail is not: what was never whole was never acknowledged."""
+        """True if nothing is wrong. A torn end is no finding: what was never whole was never acknowledged."""
         return not self.findings
 
     @property
     def usable(self) -> bool:
-        """Whether it may be gone on with: nothing is wrong, but that it may not have been closed."""
+        """True if the log may be continued: nothing is wrong, but that it may not have been closed."""
         return not self.findings or (self.end == "open" and len(self.findings) == 1)
 
 
@@ -120,7 +120,7 @@ def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> 
 def _look_at_end(
     found: AuditVerification, head: Head | None, key: bytes
 ) -> tuple[Literal["whole", "open", "doubtful"], Code | None]:
-    """What the head beside a log under a key says of its end, and what is wrong; None when nothing is."""
+    """State of the end of a log under a key by the head beside it, and the finding; None for none."""
     if head is None:
         return "doubtful", "headfile_missing"
     if not head.is_sealed_with(key):
@@ -154,7 +154,7 @@ class _Examination:
     last: AuditRecord | None = None
     keyed: bool = False
     foreign_key: bool = False
-    """Whether the log names another key than the one given; its seals are then not looked at one by one."""
+    """True if the log names another key than the one given; its seals are then not looked at one by one."""
     closed: bool = False
     format: int = 0
     unclosed: int = 0
@@ -167,7 +167,7 @@ class _Examination:
     announced: set[int] = field(default_factory=set[int])
     """Sequence numbers of the records that a redaction record names."""
     follows_a_gap: bool = False
-    """Whether the line before could not be read, so that the next one cannot be tied to it."""
+    """True if the line before could not be read, so that the next one cannot be tied to it."""
 
     def look_at(self, line: AuditLine) -> None:
         if not line.whole:

@@ -9,7 +9,6 @@ tried again twice a second; meanwhile records wait in the queue.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import secrets
 import threading
@@ -23,7 +22,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from chauffeur.concept import DataError
-from chauffeur.safety.audit.entries import BATCHED, FORMAT, LINE_START, NO_RECORD, Kind, seal
+from chauffeur.safety.audit.entries import FORMAT, LINE_START, NO_RECORD, Kind, seal, stamp, torn_end
 from chauffeur.safety.audit.heads import SEALED_SINCE, head_path, leave_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile
@@ -41,7 +40,7 @@ RETRY_S: Final = 0.5
 """Pause after a failed write."""
 
 PATIENCE_S: Final = 5.0
-"""How long the planning side waits for the disk unless it says otherwise."""
+"""Default time that the planning side waits for the disk."""
 
 _AT_ONCE: Final = 64
 """Records sealed and written together: the interpreter is not kept from control for longer than a millisecond or so."""
@@ -56,7 +55,7 @@ def utc_now() -> datetime:
 
 @dataclass(frozen=True, slots=True)
 class Closing:
-    """How an audit log ended.
+    """Final state of an audit log.
 
     Attributes:
         head: Hash of the last record on the disk. Kept elsewhere, it shows later whether the end was cut off.
@@ -72,7 +71,7 @@ class Closing:
 
     @property
     def complete(self) -> bool:
-        """Whether everything handed over is in the log."""
+        """True if everything handed over is in the log."""
         return not self.lost and not self.trouble
 
 
@@ -169,7 +168,7 @@ class AuditLog:
 
     @property
     def path(self) -> Path:
-        """Where it is written."""
+        """Path of the log."""
         return self._path
 
     @property
@@ -204,7 +203,7 @@ class AuditLog:
             Whether it will be written. False: there was no room, and the gap will be recorded instead; or the log is
             closed.
         """
-        entry = _Entry(kind, _stamp(self._clock()), body, {} if texts is None else texts)
+        entry = _Entry(kind, stamp(self._clock()), body, {} if texts is None else texts)
         with self._lock:
             if self._closing:
                 self._lost_in_all += 1
@@ -244,7 +243,7 @@ class AuditLog:
         """
         with self._lock:
             if not self._closing:
-                self._queue.append(_Entry("closed", _stamp(self._clock()), {"lost": self._lost_in_all}, {}))
+                self._queue.append(_Entry("closed", stamp(self._clock()), {"lost": self._lost_in_all}, {}))
                 self._handed_over += 1
                 self._closing = True
             self._work_there.notify()
@@ -271,8 +270,7 @@ class AuditLog:
         if not found.records and torn[: len(LINE_START)] != LINE_START[: len(torn)]:
             raise DataError(f"{self._path} is not an audit log.", hint="Name another file.")
         self._file.cut(whole)
-        before |= {"torn_bytes": len(torn), "torn_sha256": hashlib.sha256(torn).hexdigest()}
-        return found.records, found.head, before
+        return found.records, found.head, before | torn_end(torn)
 
     def _announce(self) -> None:
         """Say under the key that records will follow: after a crash, the head tells where what is sure of them ends."""
@@ -345,7 +343,7 @@ class AuditLog:
         self._in_hand = len(self._unwritten)
 
     def _tell_of_gap(self, lost: Mapping[str, int], why: str) -> _Entry:
-        gap = _Entry("gap", _stamp(self._clock()), {"lost": dict(lost), "why": why}, {})
+        gap = _Entry("gap", stamp(self._clock()), {"lost": dict(lost), "why": why}, {})
         self._unwritten.append(gap)
         self._handed_over += 1
         return gap
@@ -359,7 +357,7 @@ class AuditLog:
             self._file.append(data)
             for _ in some:
                 self._unwritten.popleft()
-            urgent = urgent or any(entry.kind not in BATCHED for entry in some)
+            urgent = urgent or any(entry.kind != "actuation" for entry in some)
             self._unsynced += len(some)
             if self._sync_due_s is None:
                 self._sync_due_s = time.monotonic() + self._sync_every_s
@@ -440,7 +438,3 @@ def _must_go_on(path: Path, found: AuditVerification) -> None:
             "continued.",
             hint="Name another file for this drive; the old log can be verified as before.",
         )
-
-
-def _stamp(moment: datetime) -> str:
-    return moment.astimezone(UTC).isoformat(timespec="milliseconds")

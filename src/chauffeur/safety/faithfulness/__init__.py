@@ -1,4 +1,4 @@
-"""Whether the thoughts R describe the program P: claims of the text, held against what the program does."""
+"""Faithfulness of the thoughts R to the program P: claims of the text, held against what the program does."""
 
 from chauffeur.concept import Faithfulness, Mismatch
 from chauffeur.concept import MismatchKind as Kind

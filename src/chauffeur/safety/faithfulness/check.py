@@ -22,7 +22,7 @@ _REMEDY: Final = "Let the thoughts say what the program does, or the program do 
 
 
 def check_faithfulness(plan: Plan, observation: Observation, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
-    """Whether what the plan's thoughts claim is what its program does, as far as reading both tells.
+    """Judge whether what the plan's thoughts claim is what its program does, as far as reading both tells.
 
     A plan without thoughts, or with another policy than a program, claims nothing that could be wrong here.
     """
@@ -36,7 +36,7 @@ def check_faithfulness(plan: Plan, observation: Observation, limits: Limits) -> 
 
 
 def check_driven(plan: Plan, observation: Observation, effect: Effect) -> Verdict:
-    """Whether what the plan's thoughts claim is what then happened.
+    """Judge whether what the plan's thoughts claim is what then happened.
 
     Args:
         plan: What was driven.
@@ -65,7 +65,7 @@ def _not_compared(check: str, why: NotCompared) -> Verdict:
 
 
 def _facts(plan: Plan) -> Facts | NotCompared:
-    """What reading finds in the plan's program, or why there is nothing to compare."""
+    """Facts of the plan's program, or why there is nothing to compare."""
     if not isinstance(plan.policy, Program):
         return "no-program"
     if not plan.thoughts.text.strip():

@@ -1,4 +1,4 @@
-"""What an explanation claims: its sentences as acts, read by the one reader of words, each with how firmly it is said.
+"""Claims of an explanation: its sentences as acts, read by the one reader of words, each with how firmly it is said.
 
 The reader reads passengers' wishes; an explanation is a model's own text. What only an explanation has is sorted out
 here by a few phrases: quoted wishes, thoughts that are turned down, remarks on the situation, order words.
@@ -20,7 +20,7 @@ from chauffeur.language.tokens import tokens_of
 Matter = Literal[
     "lane", "overtake", "back", "turn", "stop", "pull over", "speed", "gap", "check", "number", "stay", "go"
 ]
-"""What a claim is about. `check` is asking whether a way is free;
+"""Subject of a claim. `check` is asking whether a way is free;
 `stay` leaves lane, speed or gap alone; `go` says no more than that the car drives."""
 Mood = Literal["plan", "wish", "aside"]
 """A plan is what is done; a wish what somebody asked for; an aside what is, or what might be done."""
@@ -130,7 +130,7 @@ _AS_SAID: Final = {
     "pull out": "move over", "safe gap": "safe way", "are left to": "remain to", "moved": "move", "changed": "change",
     "get past": "overtake", "go by": "overtake", "passed": "pass",
 }  # fmt: skip
-"""What an explanation says as no passenger does, as a passenger says it."""
+"""Phrases of explanations that no passenger uses -> a passenger's phrase."""
 _SAID: Final = _any(*_AS_SAID)
 _LOOKS: Final = _any(
     r"is[ _]safe[ _]enter", r"(?:when|once|if|until|as soon as|whenever|provided|only|upon|while|after)\b.{0,40}"
@@ -155,7 +155,7 @@ _TOPICS: Final = {"lane": _any("lanes?", "where we are"), "speed": _any("speed",
 _EXACT: Final = frozenset({"to", "at", "exactly", "speed", "target", "be", "is"})
 _STEP: Final = frozenset({"more", "less", "faster", "slower", "higher", "lower", "above", "below", "off"})
 _DENIED: Final = re.compile(r"\bnot\b(?!.*\b(?:above|exceed|over|more|faster)\b)|\bwithin\b", re.IGNORECASE)
-"""Where a number is not what is done, or says by when."""
+"""Words beside which a number is no deed, or a time limit."""
 _LASTING: Final = _any("remain", "keeps? standing", "stay there", "stays there", "for good")
 _VAGUE: Final = _any("few", "couple", "several", "some")
 _CLOSER: Final = _any(r"clos(?:e|er|ing)", "reduce", "shrink", "tighten", "shorten", "shorter", "smaller", "less")
@@ -202,7 +202,7 @@ def claims_of(text: str, *, crossing: bool = False) -> tuple[Claim, ...]:
 
 
 def plain_words(text: str) -> str:
-    """What a text says without its asides."""
+    """The text without its asides."""
     return " ".join(clause for _, clauses in _sentences(text) for clause, mood in clauses if mood != "aside")
 
 
@@ -339,5 +339,5 @@ def _claim(act: Act, words: str, clause: str, base: Claim, *, crossing: bool) ->
 
 
 def _sign(clause: str, more: re.Pattern[str], less: re.Pattern[str]) -> int:
-    """Which way a clause says that something changes, where the reader has only its number."""
+    """Direction of a change by the words of a clause, where the reader has only its number."""
     return bool(more.search(clause)) - bool(less.search(clause))

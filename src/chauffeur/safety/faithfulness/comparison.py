@@ -11,7 +11,7 @@ from chauffeur.safety.faithfulness.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.faithfulness.numbers import Numbers
 
 DRIVEN_SPEED_MPS: Final = 1.0
-"""How far a driven speed may be off one that is told."""
+"""Tolerance of a driven speed against one that is told."""
 _ALONE: Final = re.compile(
     r"\bthat(?:'s| is) (?:all|it)\b|\bnothing (?:else|but|more)\b|\bonly [\w\s]{3,40} changes\b", re.IGNORECASE
 )
@@ -22,7 +22,7 @@ _MENTIONS: Final[dict[Matter, re.Pattern[str]]] = {
     "back": re.compile(r"\b(?:back|return)\b", re.IGNORECASE),
     "turn": re.compile(r"\b(?:left|right|straight|across)\b", re.IGNORECASE),
 }
-"""What is not called untold where such a word stands, however it was read."""
+"""Words beside which a deed counts as mentioned, however it was read."""
 _SIDE_WORDS: Final = {-2: "round", -1: "left", 0: "straight on", 1: "right", 2: "round"}
 """Quarter turns to the right, and lanes, in words; half a turn is one whichever way it was driven."""
 
@@ -75,7 +75,7 @@ def turning(sides: frozenset[int], *, driven: bool = False) -> str:
 
 
 def sign_of(off_mps: float) -> int:
-    """Whether a speed rose (+1) or fell (-1) by more than a little."""
+    """Sign of a change of speed; 0 for a small one."""
     return (off_mps >= DRIVEN_SPEED_MPS) - (off_mps <= -DRIVEN_SPEED_MPS)
 
 

@@ -21,7 +21,7 @@ _WORTH_M: Final = 2.0
 
 
 def driven_mismatches(case: Comparison, effect: Effect) -> Iterator[Mismatch]:
-    """Where a text and a drive disagree."""
+    """Yield mismatches of a text and a drive."""
     claims = [claim for claim in case.claims if claim.firm]
     if case.crossing:
         yield from _turned(claims, effect)

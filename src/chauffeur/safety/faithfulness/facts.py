@@ -1,4 +1,4 @@
-"""What a program does, as values an explanation can be held against, and what running it showed."""
+"""Facts of a program to hold an explanation against, and effects of running it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DeedKind = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait"]
 """A set-point for speed, headway, lane or route; a gap that is steered towards; leaving the stop sign; time
 that passes."""
 Base = Literal["", "ego", "other", "limit", "gap", "past", "behind", "headway", "sign", "per speed"]
-"""What a number counts from: nothing; the ego's speed; another vehicle's; the limit; the gap ahead; the lead over one
+"""Base of a number: nothing; the ego's speed; another vehicle's; the limit; the gap ahead; the lead over one
 that was passed; the gap behind; the headway; the way to the stop sign; a way divided by the ego's speed."""
 
 PERIOD_S: Final = 0.1
@@ -56,14 +56,14 @@ class Deed:
 
     @property
     def stops(self) -> bool:
-        """Whether it is a set-point for standing still."""
+        """True if it is a set-point for standing still."""
         still = any(not t.factor and abs(t.offset) < 0.05 and not t.bound for t in self.terms)
         return self.kind == "speed" and not self.aimed and still
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What reading finds.
+    """Facts that reading finds.
 
     Attributes:
         deeds: In the order of the text, functions put in where they are called.
@@ -86,7 +86,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What happened when a program ran. Simulated.
+    """Effect of running a program. Simulated.
 
     Attributes:
         lanes_moved: Lanes to the right (negative: left) between start and end.
@@ -113,7 +113,7 @@ class Effect:
 
     @property
     def stood(self) -> bool:
-        """Whether it stood still at some time."""
+        """True if it stood still at some time."""
         return self.extremes_mps[0] < STANDING_MPS
 
     @property
@@ -124,7 +124,7 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class FactSurroundings:
-    """Where the ego is when the program begins.
+    """Surroundings of the ego when the program begins.
 
     Attributes:
         speed_mps: Its speed.

@@ -1,4 +1,4 @@
-"""Whether what an explanation claims is what its program does, and what then happened."""
+"""Compares the claims of an explanation with its program, and with what then happened."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class _Case(Comparison):
                 pass
 
     def _outweighed(self, claim: Claim) -> bool:
-        """Whether something firm is said of the matter of a loose claim, or it is only an aside."""
+        """True if something firm is said of the matter of a loose claim, or it is only an aside."""
         matters = LANES if claim.matter in LANES else {claim.matter}
         return claim.aside or any(one.firm and one.matter in ("stay", *matters) for one in self.claims)
 
@@ -213,7 +213,7 @@ class _Case(Comparison):
         yield Mismatch("wrong-number", claim.sentence, f"{instead}, not {quantity.said}")
 
     def _driven_at(self, speed_mps: float) -> bool:
-        """Whether the runs of a program whose numbers cannot be read ended at a speed that is told."""
+        """True if the runs of a program whose numbers cannot be read ended at a speed that is told."""
         ends = [effect.speeds_mps[1] for effect in self.effects]
         return self.numbers.unknown_speed and any(abs(one - speed_mps) < 1.0 for one in ends)
 
@@ -241,7 +241,7 @@ class _Case(Comparison):
             yield Mismatch("not-claimed", sentence, f"it drives {faster(signs)}", self.speeds[0][1].line)
 
     def _unclaimed(self) -> Iterator[Mismatch]:
-        """What the program does and the text does not mention."""
+        """Yield deeds of the program that the text does not mention."""
         told = self.told | self.mentions
         if self.unsure or not any(claim.firm for claim in self.claims):
             return
@@ -276,7 +276,7 @@ class _Case(Comparison):
                     return
 
     def _places(self, claim: Claim) -> list[int]:
-        """Where in the program that is done which a claim tells."""
+        """Places in the program of the deeds that a claim tells."""
         match claim.matter:
             case "lane" | "pull over":
                 return [p for p, deed in self.moves if not claim.sides or deed.sides & claim.sides]

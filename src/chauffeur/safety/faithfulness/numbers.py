@@ -10,20 +10,20 @@ from chauffeur.language.quantities import Quantity
 from chauffeur.safety.faithfulness.facts import PERIOD_S, Facts, FactSurroundings, Term
 
 USUAL_HEADWAY_S: Final = 1.5
-"""What the car keeps until a program sets another."""
+"""Default headway, until a program sets another."""
 
 _SAME_SPEED_MPS: Final = 0.4
 """A change of less is none."""
 _SAME_GAP_M: Final = 0.5
 _CLOSE_SHARE: Final = 0.012
 _CLOSE: Final = {"speed": 0.26, "distance": 0.3, "time": 0.06, "share": 0.02}
-"""How far a number may be off for having been rounded in another unit: half a mph, half a foot."""
+"""Tolerance for rounding in another unit: half a mph, half a foot."""
 NOW: Final = Term("ego", 1.0, 0.0)
 """The speed that is driven already."""
 
 
 class Numbers:
-    """What a program's numbers mean where it is."""
+    """Numbers of a program, evaluated where the ego is."""
 
     def __init__(self, facts: Facts, where: FactSurroundings) -> None:
         self._facts, self._where = facts, where
@@ -54,7 +54,7 @@ class Numbers:
         return set() if None in found else {sign for sign in found if sign is not None}
 
     def sign(self, term: Term) -> int | None:
-        """Whether a speed is more (+1) or less (-1) than the present one; None where it is not known."""
+        """Sign of a speed against the present one; None where it is not known."""
         speed, now = self._where.worth(term), self._where.speed_mps
         if term.base == "ego" and (term.factor == 1.0 or now is None):
             return _sign(term.offset, _SAME_SPEED_MPS) if term.factor == 1.0 else _sign(term.factor - 1.0, 0.01)
@@ -87,7 +87,7 @@ class Numbers:
         return [speed for speed in found if speed is not None]
 
     def places(self, quantity: Quantity) -> list[int]:
-        """Where in the program a speed is set, or time passes, that a text tells."""
+        """Places in the program that set a speed, or let a time pass, that a text tells."""
         if quantity.dimension not in ("speed", "time"):
             return []
         kind = "speed" if quantity.dimension == "speed" else "wait"
@@ -104,7 +104,7 @@ class Numbers:
         return [place for place, term in told if not term.factor] or [place for place, _ in told]
 
     def supports(self, quantity: Quantity, *, exact: bool = False) -> bool:
-        """Whether a number of the text is one of the program's, or one of where the ego is."""
+        """True if a number of the text is one of the program's, or one of where the ego is."""
         unknown = self.unknown_speed and not self.wanted()
         if self._facts.of("turn"):  # the way to a stop sign is driven by a law of braking
             unknown = any(low < quantity.value < high for low, high in (deed.bounds for deed in self._speeds))

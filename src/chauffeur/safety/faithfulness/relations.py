@@ -1,4 +1,4 @@
-"""What the set-points of a program count from: "the lead's speed plus 5 m/s", "the lane on the left".
+"""Bases of a program's set-points: "the lead's speed plus 5 m/s", "the lane on the left".
 
 `programs.verify` says which calls may be reached, with which bounds, and how often loops pass; what a bound throws away
 is read here from the text: each name is anything it is ever bound to, whatever the order. That is not sound, and so may
@@ -20,6 +20,7 @@ from chauffeur.programs.catalogue import APIS
 from chauffeur.programs.extract import parse_quietly
 from chauffeur.programs.rewrite import main_function
 from chauffeur.programs.verify import CallSite, verify
+from chauffeur.safety.constant_calls import LANE_STEPS, TURNS
 from chauffeur.safety.faithfulness.facts import PERIOD_S, Base, Deed, DeedKind, Facts, Term
 
 _MAX_CHARS: Final = 100_000
@@ -28,20 +29,14 @@ _MAX_DEPTH: Final = 12
 _MAX_TERMS: Final = 12
 """Alternatives of a number beyond which it cannot be told."""
 
-_LANES: Final = {"get_left_lane": -1, "get_lane_of": 0, "get_right_lane": 1}
 _NUMBERS: Final[dict[str, Base]] = {
     "get_speed_limit": "limit", "get_target_speed": "ego", "detect_stop_sign_ahead": "sign",
     "get_desired_time_headway": "headway",
 }  # fmt: skip
 _VEHICLES: Final = {"get_ego_vehicle": "ego", "detect_front_vehicle_in": "front", "detect_rear_vehicle_in": "rear"}
-_TURNS: Final = {
-    "turn_left_at_next_intersection": -1,
-    "go_straight_at_next_intersection": 0,
-    "turn_right_at_next_intersection": 1,
-}
 _SETS: Final[dict[str, DeedKind]] = {
     "set_target_speed": "speed", "set_desired_time_headway": "headway", "set_target_lane": "lane",
-    "recover_from_stop": "go", **dict.fromkeys(_TURNS, "turn"),
+    "recover_from_stop": "go", **dict.fromkeys(TURNS, "turn"),
 }  # fmt: skip
 _SAME: Final = frozenset({"float", "int", "round", "abs", "list", "tuple", "sorted", "reversed"})
 _EGO: Final = Term("ego", 1.0, 0.0)
@@ -78,7 +73,7 @@ class _Scope:
 
 @lru_cache(maxsize=64)
 def read_facts(source: str, library: str = "") -> Facts:
-    """What a program does, as far as reading tells; never raises on bad programs. One read before is remembered."""
+    """Read the facts of a program; never raises on bad programs. Results are memoised."""
     if len(source) + len(library) > _MAX_CHARS:
         return Facts(readable=False)
     helpers, program = parse_quietly(library), parse_quietly(source)
@@ -221,8 +216,8 @@ class _Reader:
             return _bounded(args)
         if name in _SAME and args:
             return args[0]
-        if name in _LANES:
-            return frozenset({NamedThing(str(_LANES[name]))}) if not names or names[0] <= {"ego"} else _NONE
+        if name in LANE_STEPS:
+            return frozenset({NamedThing(str(LANE_STEPS[name]))}) if not names or names[0] <= {"ego"} else _NONE
         if name in _VEHICLES:
             return frozenset({NamedThing(_VEHICLES[name])})
         base = _NUMBERS.get(name, "")
@@ -308,7 +303,7 @@ class _Reader:
         terms = tuple(sorted(one for one in known if isinstance(one, Term)))
         bounds = next(((one.value.lo, one.value.hi) for one in site.arguments), (-math.inf, math.inf))
         if kind == "turn":
-            return Deed(kind, line, sides=frozenset({_TURNS[site.name]}))
+            return Deed(kind, line, sides=frozenset({TURNS[site.name]}))
         if kind != "lane":
             return Deed(kind, line, terms, times=times, bounds=bounds)
         sides = frozenset(
@@ -356,7 +351,7 @@ class _Reader:
 
 
 def _exclude(one: Sequence[tuple[int, int]], other: Sequence[tuple[int, int]]) -> bool:
-    """Whether two places stand in different arms of one `if`."""
+    """True if two places stand in different arms of one `if`."""
     arms = dict(other)
     return any(arms.get(test, arm) != arm for test, arm in one)
 

@@ -19,7 +19,7 @@ KINDS: Final[dict[MismatchKind, str]] = {
 
 
 def mismatch_words(mismatch: Mismatch) -> str:
-    """What is wrong, in a sentence that begins with its kind."""
+    """Describe a mismatch in a sentence that begins with its kind."""
     where = "" if mismatch.line is None else f" (line {mismatch.line})"
     said = f"“{mismatch.sentence}”, but " if mismatch.sentence else "not mentioned, but "
     return f"{KINDS[mismatch.kind]}: {said}{mismatch.instead}{where}"
@@ -31,5 +31,5 @@ def score_words(alignment: Faithfulness) -> str:
 
 
 def claims_words(alignment: Faithfulness) -> str:
-    """How much was compared."""
+    """The number of claims compared, in words."""
     return "1 claim compared" if alignment.claims == 1 else f"{alignment.claims} claims compared"

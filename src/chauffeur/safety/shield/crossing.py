@@ -23,6 +23,7 @@ from chauffeur.concept import Command, Lane, LaneId, Observation, VehicleState
 from chauffeur.geometry import RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import rollout
 from chauffeur.safety.shield.frame import CROSSING_RAD
+from chauffeur.safety.shield.gaps import highest
 from chauffeur.safety.shield.table import ShieldParameters
 from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 
@@ -34,14 +35,14 @@ _CLEARING_MPS: Final = 8.0
 """Speed up to which it does."""
 _STOP_S: Final = 2.5
 _CLEAR_S: Final = 7.0
-"""How long a plan is looked at: by then a car of the crossing's speeds stands, or is through."""
+"""Horizon of a plan: by then a car at the speeds of a crossing stands, or is through."""
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
 _MOVING_MPS: Final = 0.1
 """Slower than this a car stands, and what is asked may bring it back."""
 _FAR_M: Final = 40.0
-"""Where a car that turns will go cannot be told at this distance: it is not minded yet."""
+"""Distance beyond which the way of a turning car cannot be predicted: it is ignored there."""
 _BENT_M: Final = 0.1
 _JOINT_M: Final = 0.5
 _HALVINGS: Final = 8
@@ -52,7 +53,7 @@ _HELD_MPS2: Final = 0.3
 
 @dataclass(frozen=True, slots=True)
 class _Care:
-    """How much is left: time before another arrives, to the side of its way, and to the side of the ego's own."""
+    """Margins of a plan: time before another arrives, to the side of its way, and to the side of the ego's own."""
 
     after_s: float
     merge_s: float
@@ -62,17 +63,17 @@ class _Care:
     followers: bool = False
 
 
-_DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
-"""What every command has to leave; a body has its lane, and half a metre that corners are cut by."""
-_KIND: Final = replace(_DUE, followers=True)
+DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
+"""Margins that every command must leave; a body has its lane, and half a metre for cutting corners."""
+KIND: Final = replace(DUE, followers=True)
 """The same, and who follows in the ego's stream could still stop behind it. That can be the follower's own doing."""
 _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=2.0)
 """The same for a car that got off its way: it needs room to get back to it."""
-_LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
-"""What is left where that is gone, because others or tyres did what was not foreseen."""
-_STAYING: Final = replace(_LAST, room_m=_DUE.room_m)
+LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
+"""Margins of last resort, once others or tyres did what was not foreseen."""
+_STAYING: Final = replace(LAST, room_m=DUE.room_m)
 """The same on the road."""
-_BESIDE: Final = replace(_LAST, side_m=0.05)
+_BESIDE: Final = replace(LAST, side_m=0.05)
 """To stand beside somebody's way without touching it."""
 
 
@@ -87,7 +88,7 @@ class CrossingResult:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """What is to be known of a way: the nearest point, where nobody crosses any more, where a lead may stop."""
+    """Data of a way: the nearest point, the point beyond which nobody crosses, the place where a lead may stop."""
 
     at: int
     beyond: int
@@ -176,10 +177,10 @@ class Junction:
             most_mps2: Hardest acceleration that they would.
             held_up: Whether a lead is so close that it has to brake for it.
         """
-        outlook = self._outlook(observation, around, lane)
-        ways = self._candidates(lane, aim, outlook.state)
+        outlook = self.outlook(observation, around, lane)
+        ways = self.candidates(lane, aim, outlook.state)
         followed = rollout.followed(outlook.state, outlook.others)
-        cares = (_KIND, _DUE) if followed else (_DUE,)
+        cares = (KIND, DUE) if followed else (DUE,)
         tries = (_mend(outlook, ways, command, most_mps2, care, held_up=held_up) for care in cares)
         found = next((one for one in tries if one is not None), None)
         if found is not None:
@@ -190,16 +191,14 @@ class Junction:
         self._motion.commanded(observation, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, observation: Observation, around: TrafficArrays, lane: LaneId) -> _Outlook:
+    def outlook(self, observation: Observation, around: TrafficArrays, lane: LaneId) -> Outlook:
         ego, line_of = observation.ego, self._line_of
         on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
         others = rollout.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
-        return _Outlook(
-            self._motion.observe(observation), size, others, self._keep_clear(lane), self._table, self._dt_s
-        )
+        return Outlook(self._motion.observe(observation), size, others, self.keep_clear(lane), self._table, self._dt_s)
 
-    def _keep_clear(self, lane: LaneId) -> Array:
+    def keep_clear(self, lane: LaneId) -> Array:
         """The straight lanes nobody may stand in who is in a lane, as `rollout` wants them.
 
         Who is to come along its own lane, the one before it, or one that forks off where it does, comes from behind.
@@ -215,18 +214,18 @@ class Junction:
             self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(len(rows), 5)
         return self._clear_from[lane]
 
-    def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
+    def candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
         """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
-        ways = self._ways_from(lane, aim if aim in self.road[lane].successors else None)
-        if self._promised is None or any(_along(way, state) for way in ways):
+        ways = self.ways_from(lane, aim if aim in self.road[lane].successors else None)
+        if self._promised is None or any(runs_along(way, state) for way in ways):
             return ways
         return [self._promised]
 
     def _after(self, lane: Lane) -> list[tuple[Lane] | tuple[()]]:
-        """What follows a lane: each lane that begins where it ends, or nothing."""
+        """Successors of a lane, or one empty tuple."""
         return [(one,) for one in self.road.successors(lane.id)] or [()]
 
-    def _ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
+    def ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
         """Ways on from a lane, through what follows it or only `onto` one lane: rows of (x, y, heading)."""
         if (lane, onto) not in self._ways:
             own = self.road[lane]
@@ -264,7 +263,7 @@ def _turned(way: Array) -> float:
     return float(np.abs(np.diff(np.unwrap(way[:, 2]))).sum())
 
 
-def _along(way: Array, state: Array) -> bool:
+def runs_along(way: Array, state: Array) -> bool:
     at = rollout.nearest(way, state[0], state[1], -1)
     return abs(wrap_to_pi(float(way[at, 2] - state[2]))) < _AWAY_RAD
 
@@ -274,7 +273,7 @@ _Asked = tuple[float, float, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class _Outlook:
+class Outlook:
     """An instant, ready to be rolled on."""
 
     state: Array
@@ -285,10 +284,10 @@ class _Outlook:
     dt_s: float
     _ways: dict[int, _Way] = field(default_factory=dict[int, _Way])
     _troubles: dict[_Asked, float] = field(default_factory=dict[_Asked, float])
-    """What was found already: many a search comes by the same plan twice."""
+    """Memo: searches come by the same plan more than once."""
 
     def way(self, points: Array) -> _Way:
-        """What is to be known of a way before it is driven."""
+        """Data of a way, computed once an instant."""
         way = self._ways.get(id(points))
         if way is None:
             way = self._ways[id(points)] = self._seen(points)
@@ -296,12 +295,11 @@ class _Outlook:
 
     def _seen(self, points: Array) -> _Way:
         at = rollout.nearest(points, self.state[0], self.state[1], -1)
-        first, last, hold = rollout.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
-        del first
+        _, last, hold = rollout.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
         beyond = last + math.ceil(self.size[0] / rollout.STEP_M)
         return _Way(at, beyond, hold - self.table.margin_m)
 
-    def trouble_s(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+    def trouble_s(self, command: Command, points: Array, plan: CrossingPlan, care: _Care) -> float:
         """Time until a plan after a command on a way ends badly; infinite if it ends well."""
         asked = command.acceleration_mps2, command.steering_rad, id(points), id(plan), id(care)
         found = self._troubles.get(asked)
@@ -309,48 +307,29 @@ class _Outlook:
             found = self._troubles[asked] = self._foreseen(command, points, plan, care)
         return found
 
-    def _foreseen(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+    def _foreseen(self, command: Command, points: Array, plan: CrossingPlan, care: _Care) -> float:
         table, way = self.table, self.way(points)
-        stops = plan.mps2 < 0.0
+        asked = command.acceleration_mps2, command.steering_rad
+        of_others = (
+            table.others_acceleration_mps2, table.others_braking_mps2, table.others_response_s,
+            table.others_sure_braking_mps2,
+        )  # fmt: skip
+        periods = round((_STOP_S if plan.mps2 < 0.0 else _CLEAR_S) / self.dt_s)
         return rollout.rollout(
-            self.state,
-            (command.acceleration_mps2, command.steering_rad),
-            plan.mps2,
-            _CLEARING_MPS,
-            plan.law,
-            points,
-            way.at,
-            way.beyond,
-            way.hold_m,
-            self.size,
-            self.others,
-            self.lanes,
-            care.room_m,
-            care.turn_rad,
-            care.side_m,
-            care.after_s,
-            care.merge_s,
-            care.followers,
-            (
-                table.others_acceleration_mps2,
-                table.others_braking_mps2,
-                table.others_response_s,
-                table.others_sure_braking_mps2,
-            ),
-            table.braking_mps2,
-            self.dt_s,
-            round((_STOP_S if stops else _CLEAR_S) / self.dt_s),
-        )[0]
+            self.state, asked, plan.mps2, _CLEARING_MPS, plan.law, points, way.at, way.beyond, way.hold_m, self.size,
+            self.others, self.lanes, care.room_m, care.turn_rad, care.side_m, care.after_s, care.merge_s,
+            care.followers, of_others, table.braking_mps2, self.dt_s, periods,
+        )[0]  # fmt: skip
 
     def stops(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way on which the car can still stop after a command."""
-        return next((way for way in ways if self._ends_well(command, way, _STOPS, care)), None)
+        return next((way for way in ways if self._ends_well(command, way, STOPS, care)), None)
 
     def clears(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way, if on each of them the crossing can be cleared after a command: any may be taken."""
-        return ways[0] if all(self._ends_well(command, way, _CLEARS, care) for way in ways) else None
+        return ways[0] if all(self._ends_well(command, way, CLEARS, care) for way in ways) else None
 
-    def _ends_well(self, command: Command, way: Array, plans: Sequence[_Plan], care: _Care) -> bool:
+    def _ends_well(self, command: Command, way: Array, plans: Sequence[CrossingPlan], care: _Care) -> bool:
         return any(self.trouble_s(command, way, plan, care) == math.inf for plan in plans)
 
     def wheel_rad(self, law: int, points: Array, acceleration_mps2: float) -> float:
@@ -358,12 +337,12 @@ class _Outlook:
         return rollout.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
     def beside_m(self, points: Array) -> float:
-        """How far the body reaches to the side of a way now."""
+        """Lateral reach of the body from a way now, m."""
         return rollout.beside_m(self.state, points, self.way(points).at, self.size)
 
     def stays_s(self, command: Command, way: Array) -> float:
         """Time for which a plan to clear the crossing after a command keeps the car no farther off its way than now."""
-        return max(self.trouble_s(command, way, plan, _DUE) for plan in _CLEARS)
+        return max(self.trouble_s(command, way, plan, DUE) for plan in CLEARS)
 
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
@@ -376,20 +355,20 @@ class _Outlook:
 
 
 @dataclass(frozen=True, slots=True)
-class _Plan:
+class CrossingPlan:
     mps2: float
     law: int
 
 
-_STOPS: Final = tuple(_Plan(-8.0, law) for law in (0, 1, 2))
-_CLEARS: Final = tuple(_Plan(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
+STOPS: Final = tuple(CrossingPlan(-8.0, law) for law in (0, 1, 2))
+CLEARS: Final = tuple(CrossingPlan(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
 _YIELDS: Final = "Somebody crosses ahead, and goes first."
 _CLEARS_WHY: Final = "Somebody is coming: the crossing has to be cleared."
 _STRAYS: Final = "The car would leave its way, or get into that of somebody who crosses."
 
 
 def _mend(
-    outlook: _Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
+    outlook: Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
 ) -> tuple[CrossingResult, Array] | None:
     """The command with its acceleration mended, if that is enough, and the way that is then promised."""
     asked, steering = command.acceleration_mps2, command.steering_rad
@@ -398,16 +377,14 @@ def _mend(
         way = outlook.clears(command, ways, care)
     if way is not None:
         return CrossingResult(command), way
-    low, high = outlook.least_mps2, asked
-    way = outlook.stops(Command(low, steering), ways, care) if low < high else None
+    low = outlook.least_mps2
+    way = outlook.stops(Command(low, steering), ways, care) if low < asked else None
     if way is not None:
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            if outlook.stops(Command(middle, steering), [way], care) is not None:
-                low = middle
-            else:
-                high = middle
-        return CrossingResult(Command(low, steering), "yield", _YIELDS), way
+        kept = [way]
+        found = highest(
+            low, asked, lambda one: outlook.stops(Command(one, steering), kept, care) is not None, _HALVINGS
+        )
+        return CrossingResult(Command(found, steering), "yield", _YIELDS), way
     for clearing in outlook.clearing_mps2(most_mps2):
         way = outlook.clears(Command(clearing, steering), ways, care) if asked < clearing else None
         if way is not None:
@@ -415,13 +392,13 @@ def _mend(
     return None
 
 
-def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -> CrossingResult:
+def _rescue(outlook: Outlook, way: Array, command: Command, most_mps2: float) -> CrossingResult:
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
     clearing = outlook.clearing_mps2(most_mps2)
-    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _DUE.room_m
-    for care in (_DUE, _LOST):
+    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > DUE.room_m
+    for care in (DUE, _LOST):
         # To stop comes first: the way that was promised need not be the one that is wanted. A car that is off its way,
         # or is going to be, brakes before anything: at the speed that was asked for it gets farther off.
         off = strayed or care is _LOST
@@ -444,11 +421,11 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
     begun = [
         (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)
-        for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing))
+        for acceleration, plans in ((least, STOPS), *((mps2, CLEARS) for mps2 in clearing))
         for law in range(rollout.LAWS)
     ]
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
-    troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
+    troubles = [outlook.trouble_s(trial, way, plan, LAST) for trial, plan in trials]
     latest = max(troubles)
     # Of those that keep clear of others as long, the one longest on its way: a light hand may be too light.
     tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]

@@ -1,4 +1,4 @@
-"""What becomes of a car that brakes to a stand after a command: where its body gets, and whom it may meet there.
+"""Rollout of a car that brakes to a stand after a command: the poses of its body, and who may be met there.
 
 Compiled, and all in this file, because numba checks only the file a function stands in when it reuses machine code.
 
@@ -23,7 +23,7 @@ from chauffeur.safety.shield.compiled import compiled
 Array = NDArray[np.float64]
 
 PURSUE, HELD, STRAIGHT = 0, 1, 2
-"""How a car steers while it brakes: back along a line, wheel where it is, wheel straight."""
+"""Steering laws while braking: back along a line, wheel held, wheel straight."""
 LAWS: Final = (PURSUE, HELD, STRAIGHT)
 LONGEST: Final = 400
 """Periods that are looked at at most: 20 s at 20 Hz, more than any car takes to stand."""
@@ -199,7 +199,7 @@ def _place(other: Array, ways: Array, sigma: float) -> tuple[float, float]:
 
 @compiled
 def _parted(pose: Array, front: float, back: float, wide: float, other: Array, side: float) -> bool:
-    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands: separating axes."""
+    """True if a body, from so far behind its middle to so far ahead, is clear of one that stands: separating axes."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     dx, dy = other[0] - pose[0], other[1] - pose[1]
     u, v = c * dx + s * dy, c * dy - s * dx

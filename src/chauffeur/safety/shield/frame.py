@@ -1,4 +1,4 @@
-"""What the shield sees: the others in the frame of the lane the ego is in, and the lanes beside it.
+"""The scene of the shield: the others in the frame of the lane the ego is in, and the lanes beside it.
 
 s runs along the ego's lane, d across it, to the left. A lane that bends is taken to go on as the circle it is where
 the ego is.
@@ -17,10 +17,10 @@ from chauffeur.geometry import Pose, wrap_to_pi
 from chauffeur.safety.shield.traffic_arrays import ANYWHERE, Array, TrafficArrays, overlapping, placed
 
 CROSSING_RAD: Final = math.radians(40.0)
-"""What is turned by less runs along: a lead, a follower, a car that changes lanes. What is turned further crosses."""
+"""A vehicle turned by less runs along: a lead, a follower, a car that changes lanes. Any other crosses."""
 _CROSSING_SINE: Final = math.sin(CROSSING_RAD)
 _LANE_M: Final = 4.0
-"""Who drifts claims so much more to that side."""
+"""Width that a drifting vehicle claims on that side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class ShieldBody:
 
     @property
     def crosses(self) -> bool:
-        """Whether it crosses the lane rather than drive along it."""
+        """True if it crosses the lane rather than drive along it."""
         return abs(math.sin(self.heading_rad)) > _CROSSING_SINE
 
     def gap_m(self, other: ShieldBody) -> float:

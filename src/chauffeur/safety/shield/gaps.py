@@ -8,6 +8,7 @@ it travels at the speed it began with, so a stop takes v^2 / 2b and half a perio
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 
 def rss_gap_m(
@@ -89,6 +90,17 @@ def greatest_acceleration(
         if closing <= stronger * slowed / lead_braking_mps2:
             then = min(then, slowed + closing)
     return max(-braking_mps2, (then - speed_mps) / dt_s)
+
+
+def highest(low: float, high: float, holds: Callable[[float], bool], halvings: int) -> float:
+    """The highest number between one for which something holds and one for which it does not, by halving."""
+    for _ in range(halvings):
+        middle = (low + high) / 2.0
+        if holds(middle):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def free_gap_m(speed_mps: float, acceleration_mps2: float, braking_mps2: float, dt_s: float) -> float:

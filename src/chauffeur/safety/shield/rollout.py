@@ -1,4 +1,4 @@
-"""What becomes of a command at a crossing: the ego rolled on under it and then under a plan, against all who cross.
+"""Rollout of a command at a crossing: the ego under it and then under a plan, against all who cross.
 
 Compiled, and all in this file, because numba checks only the file a function stands in when it reuses machine code.
 
@@ -29,7 +29,7 @@ LAWS: Final = 4
 keeping with the whole wheel, which tight turns need."""
 
 NONE, LEFT, MET, LATE = 0, 1, 2, 3
-"""What ends a plan badly: the car leaves its way, it is where somebody may be, it does not get through in time."""
+"""Ways a plan fails: the car leaves its way, it is where another agent may be, it does not get through in time."""
 
 _HALF_LENGTH = 2.5
 _INERTIA = 1.0 / 12.0 * 29.0
@@ -53,7 +53,7 @@ _WHEEL_COST = 0.05
 _FASTEST_MPS = 14.0
 """No crossing car is expected to go faster than this, or than it does already."""
 _ALIGNED = math.cos(math.radians(40.0))
-"""What is turned by less runs along (`frame.CROSSING_RAD`)."""
+"""Cosine of `frame.CROSSING_RAD`: headings closer than that run along."""
 _BEHIND_M = 1.0
 _SETTLING = 14
 _STILL_MPS = 1e-3
@@ -64,7 +64,8 @@ _AHEAD_M = 45.0
 _BESIDE_M = 2.0
 _IN_STREAM_M = 1.5
 _SLACK = 1e-3
-_MINDED, _FOLLOWS, _PAST = 1, 2, 0
+MINDED, FOLLOWS, PAST = 1, 2, 0
+"""State of another agent: it crosses, it follows in the ego's stream, or it is past."""
 _LOOSE_M = 1.5
 
 
@@ -192,23 +193,23 @@ def wheel(law: int, state: Array, way: Array, i: int, acceleration: float, dt_s:
 
 @compiled
 def reach_m(speed: float, time_s: float, acceleration: float) -> float:
-    """How far another gets at most."""
+    """Longest way, m, that another agent can cover."""
     top = max(_FASTEST_MPS, speed)
     gaining = min(time_s, (top - speed) / acceleration)
     return (speed + 0.5 * acceleration * gaining) * gaining + top * (time_s - gaining)
 
 
 @compiled
-def _following_m(speed: float, time_s: float, acceleration: float, response_s: float, braking: float) -> float:
-    """How far one who follows gets at most, if it responds in time (RSS)."""
+def following_m(speed: float, time_s: float, acceleration: float, response_s: float, braking: float) -> float:
+    """Longest way, m, of a follower that responds in time (RSS)."""
     blind = min(time_s, response_s)
     then = speed + acceleration * blind
-    return (speed + then) / 2.0 * blind + _least_m(then, time_s - blind, braking)
+    return (speed + then) / 2.0 * blind + least_m(then, time_s - blind, braking)
 
 
 @compiled
-def _least_m(speed: float, time_s: float, braking: float) -> float:
-    """How far another gets at least."""
+def least_m(speed: float, time_s: float, braking: float) -> float:
+    """Shortest way, m, that another agent covers."""
     braked = min(time_s, speed / braking)
     return (speed - 0.5 * braking * braked) * braked
 
@@ -289,13 +290,13 @@ def expected(numbers: Array, on: NDArray[np.int64], lines: Array, aligned: float
 
 @compiled
 def _joined(cosine: float, across: float) -> bool:
-    """Whether the ego drives in the stream of another, who then follows and looks after the gap itself."""
+    """True if the ego drives in the stream of another, who then follows and looks after the gap itself."""
     return cosine > _ALIGNED and abs(across) < _IN_STREAM_M
 
 
 @compiled
 def _followed_by(state: Array, other: Array) -> bool:
-    """Whether another comes from behind in the stream the ego is in."""
+    """True if another comes from behind in the stream the ego is in."""
     ch, sh = math.cos(state[2]), math.sin(state[2])
     c, s = other[2], other[3]
     dx, dy = state[0] - other[0], state[1] - other[1]
@@ -304,7 +305,7 @@ def _followed_by(state: Array, other: Array) -> bool:
 
 @compiled
 def followed(state: Array, others: Array) -> bool:
-    """Whether anybody does."""
+    """True if any agent comes from behind in the stream the ego is in."""
     count = 0
     for j in range(len(others)):
         count += _followed_by(state, others[j])
@@ -312,7 +313,7 @@ def followed(state: Array, others: Array) -> bool:
 
 
 @compiled
-def _met(
+def met(
     state: Array,
     size: tuple[float, float],
     time_s: float,
@@ -324,11 +325,11 @@ def _met(
     merge_s: float,
     of_others: tuple[float, float, float, float],
 ) -> bool:
-    """Whether the ego's body is where somebody may be; one it has merged in front of is not minded any more."""
+    """True if the ego's body is where somebody may be; one it has merged in front of is not minded any more."""
     acceleration, braking, response_s, sure_braking = of_others
     ch, sh = math.cos(state[2]), math.sin(state[2])
     for j in range(len(others)):
-        if minded[j] == _PAST:
+        if minded[j] == PAST:
             continue
         c, s = others[j, 2], others[j, 3]
         dx, dy = state[0] - others[j, 0], state[1] - others[j, 1]
@@ -339,12 +340,12 @@ def _met(
             continue
         long = abs(cosine) * size[0] + sine * size[1]
         speed = others[j, 4]
-        if along + long + _BEHIND_M <= _least_m(speed, time_s, braking) - others[j, 5]:
+        if along + long + _BEHIND_M <= least_m(speed, time_s, braking) - others[j, 5]:
             continue
         if cosine > _ALIGNED and along <= 0.0:
             continue  # a lead: the gap to it is kept elsewhere
-        if minded[j] == _FOLLOWS:
-            if along - long - others[j, 5] < _following_m(speed, time_s, acceleration, response_s, sure_braking):
+        if minded[j] == FOLLOWS:
+            if along - long - others[j, 5] < following_m(speed, time_s, acceleration, response_s, sure_braking):
                 return True
             continue
         joined = _joined(cosine, across)
@@ -352,13 +353,13 @@ def _met(
         if along - long - others[j, 5] < reach_m(speed, left_s, acceleration):
             return True
         if joined:
-            minded[j] = _PAST
+            minded[j] = PAST
     return False
 
 
 @compiled
-def _in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: float) -> bool:
-    """Whether the ego's body is in a lane other than its own, or in the way of it: nobody may be there yet."""
+def in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: float) -> bool:
+    """True if the ego's body is in a lane other than its own, or in the way of it: nobody may be there yet."""
     ch, sh = math.cos(state[2]), math.sin(state[2])
     for k in range(len(lanes)):
         c, s = lanes[k, 2], lanes[k, 3]
@@ -374,12 +375,12 @@ def _in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: fl
 
 @compiled
 def _beside_m(across: float, turned: float, size: tuple[float, float]) -> float:
-    """How far a body reaches to the side of its way."""
+    """Lateral reach of a body from its way, m."""
     return abs(across) + abs(math.sin(turned)) * size[0] + abs(math.cos(turned)) * size[1]
 
 
 def beside_m(state: Array, way: Array, i: int, size: tuple[float, float]) -> float:
-    """How far the ego's body reaches to the side of a way, whose nearest point is `i`."""
+    """Lateral reach of the ego's body from a way, m; `i` is the nearest point."""
     across = _local(way, i, state[0], state[1])[1]
     return float(_beside_m(across, state[2] - way[i, 2], size))
 
@@ -433,10 +434,10 @@ def rollout(
         dt_s, periods: Control period, and how many are looked at.
     """
     state = start.copy()
-    minded = np.full(len(others), _MINDED)
+    minded = np.full(len(others), MINDED)
     for j in range(len(others)):
         if _followed_by(state, others[j]):
-            minded[j] = _FOLLOWS if followers else _PAST
+            minded[j] = FOLLOWS if followers else PAST
     i = at
     along, across = _local(way, i, state[0], state[1])
     off = abs(_wrapped(state[2] - way[i, 2]))
@@ -467,9 +468,9 @@ def rollout(
             off = abs(_wrapped(state[2] - way[i, 2]))
             if off > turn or _beside_m(across, off, size) > room:
                 return time_s, LEFT
-            if standing and _in_a_lane(state, size, lanes, side_m):
+            if standing and in_a_lane(state, size, lanes, side_m):
                 return time_s, MET
-            if _met(state, size, time_s, standing, others, minded, side_m, after_s, merge_s, of_others):
+            if met(state, size, time_s, standing, others, minded, side_m, after_s, merge_s, of_others):
                 return time_s, MET
         if standing or (i > beyond and then_mps2 > 0.0 and period >= _SETTLING):
             return math.inf, NONE

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
 from chauffeur.geometry import RoadGraph
@@ -31,15 +32,17 @@ from chauffeur.safety.words import speed_words
 Span = tuple[float, float]
 """(lowest, highest) place across the road, m from the centre of the ego's lane."""
 
+UNKNOWN: Final = "Where somebody is cannot be told."
+NO_NUMBER: Final = "A command that is no number was replaced."
 _CORNER_M = 0.5
 _CREEP_M = 1e-3
-"""What counts as further over a line than the body is: any more, or it could creep there period by period."""
+"""Tolerance for "further over a line": with any more, the body could creep there period by period."""
 _ALONE_RAD = 0.15
 """Angle to its lane that a slow car needs at most where there is one lane only."""
 _SLOW_MPS = 3.0
 _LANES_AT_ONCE = 2
 _TOUCH_M = 0.05
-"""How far a body must reach over a line to be in the lane beyond it."""
+"""Overlap from which a body is in the lane beyond a line."""
 _LEVEL_MPS2 = 1e-6
 _LEVEL_RAD = 1e-9
 _SURE_M = 1.0
@@ -50,10 +53,15 @@ _SLOWING_MPS2 = 1.0
 
 @dataclass(frozen=True, slots=True)
 class FilterResult:
-    """What may go to the actuator, and what was changed on the way."""
+    """A command that may go to the actuator, and its changes."""
 
     command: Command
     interventions: tuple[Intervention, ...] = ()
+
+    @classmethod
+    def replaced(cls, command: Command, safe: Command, reason: str) -> FilterResult:
+        """A command that could not be judged, with what goes in its place."""
+        return cls(safe, (Intervention("finite", reason, command, safe),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +108,9 @@ class Shield:
         around = TrafficArrays.of(observation)
         line_m = self._stop_lines.ahead_m(observation) if observation.objects and around.known else math.inf
         scene = self._lens.look(observation, observation.ego.lane, around) if _known(observation.ego) else None
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
+        if not (is_finite(command) and around.known):
             safe = self._standing_still(observation, scene)
-            return FilterResult(
-                safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),)
-            )
-        if not around.known:
-            safe = self._standing_still(observation, scene)
-            return FilterResult(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
+            return FilterResult.replaced(command, safe, UNKNOWN if is_finite(command) else NO_NUMBER)
         if scene is None:
             return FilterResult(command)
         crossings = bool(observation.road.junctions)
@@ -127,8 +130,7 @@ class Shield:
         speed = observation.ego.speed_mps
         steering = 0.0
         if scene is not None:
-            own = _own(scene)
-            steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
+            steering = self._back_to(scene, _own(scene), speed)
         return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
 
     def _guard_of(self, observation: Observation) -> Junction:
@@ -146,9 +148,7 @@ class Shield:
         """
         own = _own(scene)
         if crossings:  # where roads cross, the way is judged as it bends, and as the tyres take it
-            steering = recovery_steering(
-                scene.ego, own.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature
-            )
+            steering = self._back_to(scene, own, ego.speed_mps)
             return _Steered(command, _lanes_wide(scene, self._swept(scene, ego, steering, own)), own.lane)
         back = next((strip for strip in scene.strips if strip.lane == self._back), own)
         why = ""
@@ -160,26 +160,22 @@ class Shield:
             if not reason:
                 return _Steered(command, _lanes_wide(scene, span), lane.lane)
             why = why or reason
-        steering = recovery_steering(scene.ego, back.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature)
+        steering = self._back_to(scene, back, ego.speed_mps)
         mended = Command(command.acceleration_mps2, steering)
         changed = abs(steering - command.steering_rad) > _LEVEL_RAD
         said = (Intervention("lane", why, command, mended),) if changed else ()
         return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)), back.lane, said)
 
+    def _back_to(self, scene: ShieldScene, lane: Strip, speed_mps: float) -> float:
+        return recovery_steering(scene.ego, lane.centre_m, speed_mps, self._table.steering_rad, scene.curvature)
+
     def _swept(self, scene: ShieldScene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
-        return swept(
-            scene.ego,
-            ego.speed_mps,
-            (ego.length_m, ego.width_m),
-            steering_rad,
-            lane.centre_m,
-            self._table.steering_rad,
-            self._dt_s,
-            scene.curvature,
-        )
+        size = ego.length_m, ego.width_m
+        most_rad, dt_s = self._table.steering_rad, self._dt_s
+        return swept(scene.ego, ego.speed_mps, size, steering_rad, lane.centre_m, most_rad, dt_s, scene.curvature)
 
     def _too_sharp(self, scene: ShieldScene, speed: float, steering_rad: float) -> bool:
-        """Whether a command turns the car further away from its lane than any lane change needs."""
+        """True if a command turns the car further away from its lane than any lane change needs."""
         before = scene.ego.heading_rad
         after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
         # With one lane there is nowhere to turn to, and a slow car's tyres carry a turn on for a while.
@@ -227,14 +223,7 @@ class Shield:
                 if cap < -table.gentle_mps2
                 else ""
             )
-        needed = table.margin_m + rss_gap_m(
-            other.along_mps,
-            ego.along_mps,
-            0.0 if touched else table.others_response_s,
-            table.others_acceleration_mps2,
-            table.others_sure_braking_mps2,
-            table.gentle_mps2,
-        )
+        needed = table.entry_gap_m(other.along_mps, ego.along_mps, 0.0 if touched else table.others_response_s)
         if is_m < needed:
             return f"The lane is not free: a car {is_m:.0f} m behind in it needs {needed:.0f} m."
         return ""
@@ -319,14 +308,19 @@ class Shield:
         return wanted
 
 
+def is_finite(command: Command) -> bool:
+    """True if both numbers of a command are finite."""
+    return math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)
+
+
 def _known(vehicle: VehicleState) -> bool:
-    """Whether all of its numbers are numbers."""
+    """True if all numbers of a vehicle are finite."""
     total = vehicle.x_m + vehicle.y_m + vehicle.heading_rad + vehicle.speed_mps + vehicle.length_m + vehicle.width_m
     return math.isfinite(total)
 
 
 def _parts_from(road: RoadGraph, lane: LaneId, other: LaneId) -> bool:
-    """Whether two lanes begin at one place and lead to different ones."""
+    """True if two lanes begin at one place and lead to different ones."""
     before = {one.id for one in road.predecessors(lane)} if lane in road else set[LaneId]()
     forks = other in road and any(one.id in before for one in road.predecessors(other))
     return forks and road.places_between(lane, other) is None

@@ -14,7 +14,7 @@ from chauffeur.safety.shield.gaps import greatest_acceleration
 from chauffeur.safety.shield.table import ShieldParameters
 
 _ALONG: Final = math.cos(math.radians(60.0))
-"""Who is turned by more against the lane of a line does not drive up to it."""
+"""A vehicle turned further against the lane of a line does not approach it."""
 _LANES: Final = 1.5
 """A line holds for who passes it this many lane widths beside the middle of its lane: nobody drives around it."""
 _OVER_M: Final = 0.5

@@ -27,9 +27,10 @@ from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle, c
 from chauffeur.geometry import Polyline, Pose, RoadGraph, Route, joined, wrap_to_pi
 from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield import failsafe
-from chauffeur.safety.shield.gaps import rss_gap_m
-from chauffeur.safety.shield.shield import FilterResult, Shield
+from chauffeur.safety.shield.gaps import highest
+from chauffeur.safety.shield.shield import NO_NUMBER, UNKNOWN, FilterResult, Shield, is_finite
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
+from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 from chauffeur.safety.words import speed_words
 from chauffeur.worlds.town.way import astride_m, most_mps
 
@@ -42,22 +43,22 @@ _ALONG_RAD: Final = math.radians(40.0)
 _SIDE_M: Final = 0.15
 _PERSON_SIDE_M: Final = 0.4
 _EDGE_M: Final = 0.1
-"""What the outline may reach over the edge of its ground: the filter knows the car exactly, and lanes to that."""
+"""Tolerance of the outline over the edge of its ground: the filter knows the car exactly, and lanes to that."""
 _EVERY: Final = 2
 """The ground under the car is looked at every so many periods: 3 m apart at 30 m/s, less than half of any body."""
 _FOLLOWS_MPS: Final = 2.5
 _FOLLOWS_S: Final = 0.2
-"""How a line is followed to see what the car takes of the road beside it."""
+"""Speed and period of the walk along a line that measures the road the car takes beside it."""
 _AROUND_ROWS: Final = 3
 _SWING_SHARE: Final = 1.25
-"""Who comes into a bend from beside the middle of its lane swings out by so much more."""
+"""A car that enters a bend beside the middle of its lane swings out by this factor more."""
 _SKID_RADPS: Final = 0.2
 """Tyres that hold turn a car as its wheel says, to less than this; at 0.4 rad/s a car on snow is on its way round."""
 _OVERHANG_M: Final = 0.3
-"""What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
+"""Overhang of a bumper over a kerb in a bend that is too tight otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
 _OVER_M: Final = 1.0
-"""Who is farther over a line than this, and cannot wait with its tail before it, clears the junction."""
+"""A car farther over a line than this, which cannot wait with its tail before it, clears the junction."""
 _SERVED_MPS: Final = 0.1
 _AT_SIGN_M: Final = 4.0
 _CLEAR_M: Final = 3.5
@@ -68,7 +69,7 @@ _BEND_MPS2: Final = 3.0
 _BRAKING_MPS2: Final = 3.0
 _ASTRAY_RAD: Final = 0.7
 _ASIDE_M: Final = 2.2
-"""Who is turned by more against their lane, or farther beside its middle, follows no lane."""
+"""A vehicle turned by more against its lane, or farther beside its middle, follows no lane."""
 _WAYS: Final = 3
 """Ways on that somebody may take are followed up to so many."""
 
@@ -97,7 +98,7 @@ class _Way:
     edge_m: Array
 
     def station_m(self, ego: VehicleState) -> float:
-        """How far along the line the ego is."""
+        """Station of the ego on the line, m."""
         low = max(0, int(self.starts_m[self.own]) - 6)
         after = self.starts_m[self.own + 1] if self.own + 1 < len(self.starts_m) else self.line.length_m
         own = self.rows[low : int(after) + 7]
@@ -106,7 +107,7 @@ class _Way:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Around:
-    """Who is to be minded: rows as of `failsafe`, and who they are."""
+    """Relevant agents: rows as of `failsafe`, and the vehicles they stand for."""
 
     who: tuple[VehicleState, ...]
     rows: Array
@@ -141,7 +142,7 @@ class StreetShield(Shield):
         car: KinematicBicycle = LINCOLN_MKZ,
     ) -> None:
         super().__init__(dt_s, limits, parameters)
-        self._period_s, self._most, self._bounds, self._car = dt_s, limits or Limits(), parameters, car
+        self._car = car
         self._numbers = failsafe.numbers(car)
         self._ways: dict[tuple[LaneId, ...], _Way] = {}
         self._road: RoadGraph | None = None
@@ -160,10 +161,10 @@ class StreetShield(Shield):
     def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
         """The command, changed as little as needed; arguments as of `Shield.guard`."""
         ego = observation.ego
-        if not _known(ego) or not all(map(_known, (*observation.others, *observation.objects))):
-            return _replaced(command, self._halt(ego), "finite", "Where somebody is cannot be told.")
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            return _replaced(command, self._halt(ego), "finite", "A command that is no number was replaced.")
+        if not TrafficArrays.of(observation).known:
+            return FilterResult.replaced(command, self._halt(ego), UNKNOWN)
+        if not is_finite(command):
+            return FilterResult.replaced(command, self._halt(ego), NO_NUMBER)
         way = self._way_of(observation, aim)
         if way is None:
             return FilterResult(command)
@@ -191,11 +192,11 @@ class StreetShield(Shield):
 
     def _halt(self, ego: VehicleState) -> Command:
         speed = ego.speed_mps if math.isfinite(ego.speed_mps) else math.inf
-        return Command(max(-self._bounds.braking_mps2, -max(speed, 0.0) / self._period_s), 0.0)
+        return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), 0.0)
 
     def _least(self, ego: VehicleState) -> float:
         """Hardest braking that does not ask for more than a stand."""
-        return max(-self._car.most_braking_mps2, -max(ego.speed_mps, 0.0) / self._period_s)
+        return max(-self._car.most_braking_mps2, -max(ego.speed_mps, 0.0) / self._dt_s)
 
     def _state(self, ego: VehicleState) -> Array:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._car.rear_to_middle_m)
@@ -226,18 +227,12 @@ class StreetShield(Shield):
 
     def _hardest(self, now: _Instant, asked: float, steering: float, least: float) -> float:
         """The highest acceleration below what is asked that leaves a manoeuvre."""
-        low, high = least, asked
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            if self._leaves(now, Command(middle, steering)) is None:
-                low = middle
-            else:
-                high = middle
-        self._leaves(now, Command(low, steering))
-        return low
+        found = highest(least, asked, lambda one: self._leaves(now, Command(one, steering)) is None, _HALVINGS)
+        self._leaves(now, Command(found, steering))  # the manoeuvre of this one is kept
+        return found
 
     def _steering(self, now: _Instant, way: _Way, law: int) -> float:
-        """What a way of steering asks for now."""
+        """Wheel angle of a steering law now, rad."""
         if law == failsafe.HELD:
             return now.ego.steering_rad
         if law == failsafe.STRAIGHT:
@@ -254,7 +249,7 @@ class StreetShield(Shield):
                 if law != failsafe.PURSUE and way is not now.ways[0]:
                     continue
                 poses = failsafe.stopped(
-                    now.state, command.acceleration_mps2, command.steering_rad, self._numbers, self._period_s,
+                    now.state, command.acceleration_mps2, command.steering_rad, self._numbers, self._dt_s,
                     way.rows, at, law,
                 )  # fmt: skip
                 fault = self._fault(now, way, poses)
@@ -270,14 +265,14 @@ class StreetShield(Shield):
         around = now.around
         if len(around.rows):
             row = failsafe.met(
-                poses, self._period_s, self._numbers, around.rows, self._points, self._bounds.others_braking_mps2
+                poses, self._dt_s, self._numbers, around.rows, self._points, self._table.others_braking_mps2
             )
             if row >= 0:
                 return _Fault(around.who[row])
         return None
 
     def _strays(self, ground: Ground, way: _Way, poses: Array) -> bool:
-        """Whether the outline leaves its ground on a way, or gets farther out where it is out already."""
+        """True if the outline leaves its ground on a way, or gets farther out where it is out already."""
         poses = np.concatenate([poses[:2], poses[2:-1:_EVERY], poses[-1:]])
         car, places = self._car, poses[:, :3]
         beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True)
@@ -365,13 +360,13 @@ class StreetShield(Shield):
         """The strictest bound of the acceleration by limits, lights and signs: (m/s2, rule, reason)."""
         ego, speed = observation.ego, max(0.0, observation.ego.speed_mps)
         lane = observation.road.get(ego.lane)
-        limit = self._most.most_mps(math.inf if lane is None else lane.speed_limit_mps)
-        allowed = max((limit - speed) / self._period_s, -_SLOWING_MPS2)
-        strictest = min(allowed, self._bounds.acceleration_mps2), "speed", f"No faster than {speed_words(limit)} here."
+        limit = self._limits.most_mps(math.inf if lane is None else lane.speed_limit_mps)
+        allowed = max((limit - speed) / self._dt_s, -_SLOWING_MPS2)
+        strictest = min(allowed, self._table.acceleration_mps2), "speed", f"No faster than {speed_words(limit)} here."
         if self._skids(ego) and strictest[0] > 0.0:
             strictest = 0.0, "skid", "The tyres slide: no throttle until they hold."
-        bend = float(way.most_mps[max(0, min(len(way.most_mps) - 1, round(station + speed * self._period_s)))])
-        slow = (bend - speed) / self._period_s
+        bend = float(way.most_mps[max(0, min(len(way.most_mps) - 1, round(station + speed * self._dt_s)))])
+        slow = (bend - speed) / self._dt_s
         if slow < strictest[0]:
             strictest = max(slow, -_BRAKING_MPS2 - 1.0), "speed", "The bend ahead is too sharp for this speed."
         nose = station + ego.length_m / 2.0
@@ -384,10 +379,10 @@ class StreetShield(Shield):
             room = ahead
             if ahead < -_OVER_M:  # its front is over it: it may wait so, as long as its tail is not
                 room += astride_m(ego.length_m)
-                if signal.state == "yellow" or speed * speed > 2.0 * self._bounds.gentle_mps2 * max(0.0, room):
+                if signal.state == "yellow" or speed * speed > 2.0 * self._table.gentle_mps2 * max(0.0, room):
                     continue
             cap = self._stopping(speed, room)
-            if cap >= strictest[0] or (signal.state == "yellow" and cap < -self._bounds.gentle_mps2):
+            if cap >= strictest[0] or (signal.state == "yellow" and cap < -self._table.gentle_mps2):
                 continue
             why = f"The light shows {signal.state}."
             if signal.state == "green":
@@ -413,7 +408,7 @@ class StreetShield(Shield):
         return strictest
 
     def _skids(self, ego: VehicleState) -> bool:
-        """Whether a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
+        """True if a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
         wheel = ego.speed_mps * curvature_of(ego.speed_mps, ego.steering_rad, self._car)
         return self._car.stray_s > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
 
@@ -426,7 +421,7 @@ class StreetShield(Shield):
     def _stopping(self, speed: float, ahead_m: float) -> float:
         """Hardest acceleration after which the car still stops before a line."""
         if ahead_m < 0.05:
-            return -self._bounds.braking_mps2 if speed < 3.0 else math.inf
+            return -self._table.braking_mps2 if speed < 3.0 else math.inf
         return self._stop_lines.most_mps2(speed, ahead_m)
 
     def _line_m(self, way: _Way, at: int, line: _Line) -> float:
@@ -440,7 +435,7 @@ class StreetShield(Shield):
         return found
 
     def _held_up(self, observation: Observation, way: _Way, station: float, ahead: float) -> bool:
-        """Whether somebody who stands leaves no room behind a line for all of the car."""
+        """True if a standing vehicle leaves no room behind a line for all of the car."""
         ego = observation.ego
         line = station + ego.length_m / 2.0 + ahead
         for other in observation.others:
@@ -458,9 +453,9 @@ class StreetShield(Shield):
 
     def _around(self, observation: Observation) -> _Around:
         """Everybody who may come near while the ego brakes to a stand."""
-        ego, table, road = observation.ego, self._bounds, observation.road
-        until_s = max(ego.speed_mps, 0.0) / self._car.most_braking_mps2 + 2.0 * self._period_s + self._car.lag_s
-        own = (max(ego.speed_mps, 0.0) + table.acceleration_mps2 * self._period_s) * until_s + ego.length_m + 1.0
+        ego, table, road = observation.ego, self._table, observation.road
+        until_s = max(ego.speed_mps, 0.0) / self._car.most_braking_mps2 + 2.0 * self._dt_s + self._car.lag_s
+        own = (max(ego.speed_mps, 0.0) + table.acceleration_mps2 * self._dt_s) * until_s + ego.length_m + 1.0
         here = Pose(ego.x_m, ego.y_m, ego.heading_rad)
         who: list[VehicleState] = []
         rows: list[tuple[float, ...]] = []
@@ -479,10 +474,7 @@ class StreetShield(Shield):
                     if abs(line.sees(ego.x_m, ego.y_m)[1]) < (ego.width_m + other.width_m) / 2.0:
                         continue  # who comes from behind minds the ego
                 if along and ahead < 0.0:
-                    entry = table.margin_m + rss_gap_m(
-                        speed, ego.speed_mps, response, table.others_acceleration_mps2, table.others_sure_braking_mps2,
-                        table.gentle_mps2,
-                    )  # fmt: skip
+                    entry = table.entry_gap_m(speed, ego.speed_mps, response)
             if math.hypot(ahead, aside) > own + max(speed * until_s, after, entry) + other.length_m:
                 continue  # out of reach until the ego stands
             side = _PERSON_SIDE_M if person else _SIDE_M
@@ -511,14 +503,6 @@ class StreetShield(Shield):
         if abs(aside) > _ASIDE_M or abs(turned) > _ASTRAY_RAD:
             return straight
         return [(float(start), float(count), station, aside) for start, count in paths]
-
-
-def _known(one: VehicleState) -> bool:
-    return math.isfinite(one.x_m + one.y_m + one.heading_rad + one.speed_mps + one.length_m + one.width_m)
-
-
-def _replaced(command: Command, safe: Command, rule: str, reason: str) -> FilterResult:
-    return FilterResult(safe, (Intervention(rule, reason, command, safe),))
 
 
 def _owed_to(fault: _Fault) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Where the ego gets across the road: one period under a command, then back to its lane.
+"""Lateral sweep of the ego: one period under a command, then back to its lane.
 
 The same kinematic bicycle and lane keeping as the vehicle's own, so that a command is accepted exactly if the shield
 could still bring the car back after it.

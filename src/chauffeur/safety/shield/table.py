@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from chauffeur.safety.shield.gaps import rss_gap_m
+
 SHIELD_VERSION: Final = "shield-v5"
 """Changes whenever the same command could be let through differently."""
 
@@ -50,6 +52,18 @@ class ShieldParameters:
     drift_mps: float = 0.25
     sideways_mps: float = 8.0
     gentle_mps2: float = 3.0
+
+    def entry_gap_m(self, rear_mps: float, front_mps: float, response_s: float) -> float:
+        """Clear distance, m, that a car behind needs to one that enters its lane and then brakes no harder than gently.
+
+        Args:
+            rear_mps, front_mps: Speeds.
+            response_s: Time until the car behind responds; 0 once it has seen the other.
+        """
+        return self.margin_m + rss_gap_m(
+            rear_mps, front_mps, response_s, self.others_acceleration_mps2, self.others_sure_braking_mps2,
+            self.gentle_mps2,
+        )  # fmt: skip
 
 
 LAMPILOT_SHIELD = ShieldParameters()

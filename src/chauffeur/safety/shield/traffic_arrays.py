@@ -24,7 +24,7 @@ _NUMBERS: Final = "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m
 _read: Final = attrgetter(*_NUMBERS)
 
 AHEAD, BEHIND, ANYWHERE = 1, -1, 0
-"""Which of them are asked for: those whose centre is ahead of the ego's, behind it, or all."""
+"""Selects agents whose centre is ahead of the ego's, behind it, or all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
