@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
 from chauffeur.describe.services import (
-    ContextServices,
     Position,
     RoadMap,
     ServiceReading,
-    ServiceSettings,
+    Sources,
+    SourceSettings,
     Unknown,
     load_road_map,
     load_rules,
@@ -521,7 +521,7 @@ def test_without_its_libraries_it_is_said_what_to_install(
     monkeypatch.setitem(sys.modules, library, None)
     asking: list[Callable[[], object]] = [lambda: load_road_map(path)]
     if library == "shapely":
-        asking += [lambda: RoadMap([]), lambda: ContextServices(ServiceSettings(online=frozenset({"map"})))]
+        asking += [lambda: RoadMap([]), lambda: Sources(SourceSettings(at(0, 0), ["map"]))]
     for ask in asking:
         with pytest.raises(MissingExtraError) as caught:
             ask()

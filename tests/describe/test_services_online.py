@@ -15,14 +15,14 @@ from test_services_server import NOW, Asked, reply, roads_json, serving, traffic
 
 from chauffeur.concept import ConfigError
 from chauffeur.describe.services import (
-    ContextServices,
     Position,
     ServiceReading,
-    ServiceSettings,
+    Sources,
+    SourceSettings,
     Surroundings,
     Unknown,
 )
-from chauffeur.describe.services.settings import ONLINE, Online
+from chauffeur.describe.services.sources import ONLINE, Online
 from chauffeur.describe.services.traffic import read_traffic
 
 pytestmark = pytest.mark.server
@@ -51,7 +51,7 @@ class Clock:
 class Car:
     """Services of one car in a test."""
 
-    services: ContextServices
+    services: Sources
     clock: Clock
     spent_s: list[float] = field(default_factory=list)
 
@@ -72,18 +72,10 @@ def drive(
     keys: dict[str, str] | None = None,
 ) -> Car:
     """Run a test's steps with services at these addresses; an empty one is not asked."""
-    online: set[Online] = {name for name, url in zip(ONLINE, (weather, roads, traffic), strict=True) if url}
-    settings = ServiceSettings(
-        online=frozenset(online),
-        weather_url=weather or "https://weather.invalid",
-        map_url=roads or "https://map.invalid",
-        traffic_url=traffic or "https://traffic.invalid",
-        patience_s=patience_s,
-    )
+    urls: dict[Online, str] = {name: url for name, url in zip(ONLINE, (weather, roads, traffic), strict=True) if url}
     clock = Clock()
-    services = ContextServices(
-        settings, clock=clock, environ=KEYS if keys is None else keys, rng=np.random.default_rng(1)
-    )
+    settings = SourceSettings(HERE, tuple(urls), urls, patience_s=patience_s)
+    services = Sources(settings, clock=clock, environ=KEYS if keys is None else keys, rng=np.random.default_rng(1))
     car = Car(services, clock)
 
     async def whole() -> None:
@@ -338,35 +330,34 @@ def test_the_key_is_in_no_log_and_no_error(caplog: pytest.LogCaptureFixture) -> 
 
 @pytest.mark.parametrize("key", ["two words", "línea", "a\nb"])
 def test_what_is_no_key_is_refused_and_not_shown(key: str) -> None:
-    settings = ServiceSettings(online=frozenset({"weather"}))
+    settings = SourceSettings(HERE, ["weather"])
     with pytest.raises(ConfigError, match="OPENWEATHER_API_KEY") as caught:
-        ContextServices(settings, environ={"OPENWEATHER_API_KEY": key})
+        Sources(settings, environ={"OPENWEATHER_API_KEY": key})
     assert key not in str(caught.value)
 
 
 def test_a_key_does_not_cross_a_public_network_unencrypted() -> None:
-    settings = ServiceSettings(online=frozenset({"traffic"}), traffic_url="http://traffic.example.com")
+    settings = SourceSettings(HERE, ["traffic"], {"traffic": "http://traffic.example.com"})
     with pytest.raises(ConfigError, match="unencrypted"):
-        ContextServices(settings, environ=KEYS)
+        Sources(settings, environ=KEYS)
 
 
 @pytest.mark.parametrize(
     "changed",
     [
-        {"map_url": "ftp://x"},
-        {"map_url": "http://user:sesame@host/"},
-        {"map_url": "http://host/?key=1"},
-        {"map_url": "http://[::1"},
-        {"weather_url": ""},
+        {"urls": {"map": "ftp://x"}},
+        {"urls": {"map": "http://user:sesame@host/"}},
+        {"urls": {"map": "http://host/?key=1"}},
+        {"urls": {"map": "http://[::1"}},
+        {"urls": {"weather": ""}},
         {"patience_s": 0.0},
         {"patience_s": float("nan")},
-        {"weather_decimals": 9},
-        {"online": frozenset({"astrology"})},
+        {"online": ["astrology"]},
     ],
 )
 def test_settings_that_cannot_be_used(changed: dict[str, object]) -> None:
     with pytest.raises(ConfigError) as caught:
-        ServiceSettings(**changed)  # pyright: ignore[reportArgumentType]
+        SourceSettings(HERE, **changed)  # pyright: ignore[reportArgumentType]
     assert caught.value.hint
     assert "sesame" not in str(caught.value)
 
@@ -700,11 +691,8 @@ def test_what_a_service_writes_does_not_reach_the_words() -> None:
 def test_services_live_through_a_change_of_event_loop() -> None:
     clock = Clock()
     with serving(everything) as service, serving(lambda _: None) as silent:
-        services = ContextServices(
-            ServiceSettings(online=frozenset({"weather", "traffic"}), weather_url=service.url, traffic_url=silent.url),
-            clock=clock,
-            environ=KEYS,
-        )
+        urls: dict[Online, str] = {"weather": service.url, "traffic": silent.url}
+        services = Sources(SourceSettings(HERE, tuple(urls), urls), clock=clock, environ=KEYS)
         for _ in range(2):
             found = asyncio.run(services.around(HERE, budget_s=1.0))
             clock.now += 1_000.0
