@@ -102,20 +102,6 @@ def test_feedback_goes_to_the_last_trip_or_to_the_one_named(memory: Memory) -> N
     assert [[one["text"] for one in kept["feedback"]] for kept in trips] == [[], ["second"], ["last", "a again"]]
 
 
-def test_both_sides_of_a_conflict_come_back_with_their_dates(memory: Memory, clock: Clock) -> None:
-    memory.remember(trip("Ann", "drive faster"), Feedback("too fast", speed=-1))
-    clock.pass_by(days=3)
-    memory.remember(trip("Ann", "drive a bit faster"), Feedback("too slow", speed=1))
-    items = recall(memory, ANN).items
-    assert {item.when[:10]: item.feedback[0].speed for item in items} == {"2026-03-01": -1, "2026-03-04": 1}
-
-
-def test_opposite_wishes_are_not_recalled(memory: Memory, wishes: Wishes) -> None:
-    memory.remember(trip("Ann", "Drive slower"))
-    memory.remember(trip("Ann", "Please hurry up"))
-    assert wishes(memory, "Ann", "Can you drive faster?") == ["Please hurry up"]
-
-
 def test_recall_of_nobody_and_of_strangers_writes_nothing(memory: Memory, tmp_path: Path) -> None:
     for person in (NOBODY, PersonId("  "), ANN):
         assert recall(memory, person) == History()
