@@ -27,6 +27,8 @@ from chauffeur.concept.data import data_home
 from chauffeur.memory import Memory, VaultMemory, interpret_feedback
 from chauffeur.memory.records import MAX_CHARS
 
+pytestmark = pytest.mark.usefixtures("unsynced")
+
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
 Wishes = Callable[..., list[str]]
 
