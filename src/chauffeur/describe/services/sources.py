@@ -22,7 +22,6 @@ import asyncio
 import math
 import os
 import time
-import tomllib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -30,7 +29,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from chauffeur.concept import ConfigError
 from chauffeur.concept.addresses import http_address, read_key
@@ -43,6 +42,7 @@ from chauffeur.describe.services.road_map import RoadMap, geometry
 from chauffeur.describe.services.roads import RoadPlace, place_at
 from chauffeur.describe.services.rules import Rules, load_rules
 from chauffeur.describe.services.surroundings import Surroundings
+from chauffeur.describe.services.toml_file import read_file
 from chauffeur.describe.services.traffic import LEAST_CONFIDENCE, TOMTOM, TrafficReport
 from chauffeur.describe.services.weather import OPEN_WEATHER
 
@@ -315,17 +315,7 @@ def read_sources(path: Path) -> SourceSettings:
         DataError: The map cannot be used.
         MissingExtraError: A map is named, and no library reads it.
     """
-    try:
-        file = _File.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"The context file {path} cannot be read: {error}.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path} is no TOML: {error}.") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the file"
-        words = first["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"{path}, {where}: {words}.", hint="See docs/services.md.") from error
+    file = read_file(_File, path)
     at, region = file.position, file.region
     if at.at is not None:
         place: Position | tuple[str, int] = Position(*at.at, at.heading_deg, at.accuracy_m)
