@@ -10,12 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from memory_trips import Clock, context, trip
+from memory_trips import Clock, chroma_memory, context, trip
 
 from chauffeur.concept import Feedback, Instruction, MissingExtraError, PersonId, ProfileError
 from chauffeur.memory import Memory, VaultMemory, interpret_feedback
 from chauffeur.memory.chroma import ChromaMemory, _blank
-from conftest import chroma_memory
 
 try:
     import chromadb  # pyright: ignore[reportMissingImports]
