@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.concept import Feedback, HistoryItem, MissingExtraError, PersonId, ProfileError, Trip
+from chauffeur.concept import Feedback, HistoryItem, MissingExtraError, PersonId, Trip
 from chauffeur.concept.data import data_home
 from chauffeur.language.weather import weather_of
 from chauffeur.memory.columns import Columns, Entry, packed
@@ -53,6 +53,7 @@ class ChromaMemory(ProfileMemory):
 
     encrypts = False
     _format = FORMAT
+    _failures = (BaseException,)  # Chroma names no family of errors, and its core panics past `Exception`
 
     def __init__(
         self, home: Path | None = None, *, privacy: Privacy | None = None, clock: Callable[[], datetime] = utc_now
@@ -98,25 +99,8 @@ class ChromaMemory(ProfileMemory):
                 _destroy(folder)
         return bool(there)
 
-    def _remedy(self) -> str:
-        return f"Restore the salt; or delete these folders in {self._folder}, whosever they are."
-
     def _locked(self) -> AbstractContextManager[None]:
         return locked(self._folder / "lock", alone=True)
-
-    @contextmanager
-    def _errors(self, person: str) -> Generator[None]:
-        try:
-            yield
-        except (ProfileError, KeyboardInterrupt, SystemExit, GeneratorExit):
-            raise
-        except BaseException as error:  # Chroma names no family of errors, and its core panics past `Exception`
-            raise ProfileError(
-                f"The profile of {person!r} in {self._folder} cannot be used: {error}.",
-                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh. "
-                "Other profiles are not affected.",
-                retryable=isinstance(error, OSError),
-            ) from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,6 +78,8 @@ class ProfileMemory(ABC):
     encrypts: ClassVar[bool]
     _format: ClassVar[str]
     """Version of what is exported."""
+    _failures: ClassVar[tuple[type[BaseException], ...]]
+    """What the storage raises."""
 
     def __init__(self, folder: Path, ring: KeyRing, privacy: Privacy, clock: Callable[[], datetime]) -> None:
         """Nothing is written before there is something to remember.
@@ -105,14 +107,6 @@ class ProfileMemory(ABC):
     @abstractmethod
     def _destroy(self, aliases: Iterable[str]) -> bool:
         """Remove profiles for good, damaged ones too; False where there was nothing."""
-
-    @abstractmethod
-    def _errors(self, person: str) -> AbstractContextManager[None]:
-        """Turns errors of the storage into ProfileError."""
-
-    @abstractmethod
-    def _remedy(self) -> str:
-        """What a person can do where the salt is lost, and profiles cannot be opened to say whose they are."""
 
     def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
         """As `Memory.recall`; similarity is set on every item."""
@@ -178,7 +172,8 @@ class ProfileMemory(ABC):
                 raise ProfileError(
                     f"Whether anything is kept of {person!r} cannot be told: {error.message} And {len(closed)} "
                     f"profiles cannot be opened: {', '.join(closed)}.",
-                    hint=self._remedy(),
+                    hint="Restore the salt, or the passphrase; or delete all files and folders of these names in "
+                    f"{self._folder.parent}, whosever they are.",
                 ) from error
         with self._errors(person):
             return self._destroy(aliases)
@@ -229,3 +224,18 @@ class ProfileMemory(ABC):
             return
         with self._open(self._ring.alias(person), person) as profile:
             yield profile
+
+    @contextmanager
+    def _errors(self, person: str) -> Generator[None]:
+        """Turn errors of the storage into ProfileError."""
+        try:
+            yield
+        except (ProfileError, KeyboardInterrupt, SystemExit, GeneratorExit):
+            raise
+        except self._failures as error:
+            raise ProfileError(
+                f"The profile of {person!r} in {self._folder} cannot be used: {error}.",
+                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh; if the "
+                "file is busy or the disk full, try again. Other profiles are not affected.",
+                retryable=isinstance(error, OSError) or any(word in str(error) for word in ("locked", "full")),
+            ) from error

@@ -61,6 +61,7 @@ class VaultMemory(ProfileMemory):
 
     encrypts = True
     _format = VERSION
+    _failures = (DatabaseError, OSError)
 
     def __init__(
         self,
@@ -113,12 +114,6 @@ class VaultMemory(ProfileMemory):
             sync_directory(self._keys)
             sync_directory(self._folder)
         return existed
-
-    def _remedy(self) -> str:
-        return (
-            f"Restore the salt, or the passphrase; or delete these files in {self._keys} and {self._folder}, "
-            "whosever they are."
-        )
 
     @contextmanager
     def _made(self, person: PersonId) -> Generator[Profile]:
@@ -212,18 +207,6 @@ class VaultMemory(ProfileMemory):
 
     def _path(self, alias: str) -> Path:
         return self._folder / f"{alias}.db"
-
-    @contextmanager
-    def _errors(self, person: str) -> Generator[None]:
-        try:
-            yield
-        except (DatabaseError, OSError) as error:
-            raise ProfileError(
-                f"The profile of {person!r} in {self._folder} cannot be used: {error}.",
-                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh; if the "
-                "file is busy or the disk full, try again. Other profiles are not affected.",
-                retryable=isinstance(error, OSError) or any(word in str(error) for word in ("locked", "full")),
-            ) from error
 
 
 _inherited: list[_Opened] = []
