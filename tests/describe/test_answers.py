@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from chauffeur.bench.passengers import load_wishes
 from chauffeur.concept import Context, Lead, Situation
-from chauffeur.describe.answers import answer_to, asks_to_know, with_doing, with_way
+from chauffeur.describe.answers import answer_to, with_doing, with_way
+from chauffeur.language.inquiries import asks_to_know
 from chauffeur.worlds.places import Destination
 
 ROAD = Situation("highway", 28.0, 31.2928, 4, 1, True, Lead(2, 40.0, 24.0), None)

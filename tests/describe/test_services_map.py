@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
 from chauffeur.describe.services import (
-    ContextServices,
     Position,
     RoadMap,
     ServiceReading,
-    ServiceSettings,
+    Sources,
+    SourceSettings,
     Unknown,
     load_road_map,
     load_rules,
@@ -29,7 +29,7 @@ from chauffeur.describe.services import (
 )
 from chauffeur.describe.services.osm_file import MAX_BYTES
 from chauffeur.describe.services.readings import M_PER_DEG, distance_m
-from chauffeur.describe.services.road_map import LOOK_AHEAD_M, REACH_M
+from chauffeur.describe.services.road_map import LOOK_AHEAD_M, REACH_M, RoadAhead
 from chauffeur.describe.services.roads import Limit, RoadPlace, place_at
 from chauffeur.describe.services.ways import ServiceWay, way_of
 
@@ -84,15 +84,17 @@ def test_a_motorways_limit_is_never_the_side_streets(north_m: float) -> None:
     assert place.road.confidence > 0.8
 
 
-def test_crossing_below_the_motorway_is_the_side_street() -> None:
-    place = place_at(TOWN, at(1.0, 50.0, EAST + 4.0), GERMANY, NOW)
-    assert kmh(place) == 30.0
-    assert kmh(place_at(TOWN, at(1.0, 50.0, WEST), GERMANY, NOW)) == 30.0
-
-
-def test_the_outer_lane_of_a_motorway_is_still_the_motorway() -> None:
-    assert kmh(place_at(TOWN, at(9.0, -600.0, 0.0, accuracy_m=4.0), GERMANY, NOW)) == 120.0
-    assert kmh(place_at(TOWN, at(22.0, -600.0, 0.0, accuracy_m=4.0), GERMANY, NOW)) == 20.0
+@pytest.mark.parametrize(
+    ("position", "expected"),
+    [
+        (at(1.0, 50.0, EAST + 4.0), 30.0),  # below the motorway
+        (at(1.0, 50.0, WEST), 30.0),
+        (at(9.0, -600.0, 0.0, accuracy_m=4.0), 120.0),  # its outer lane
+        (at(22.0, -600.0, 0.0, accuracy_m=4.0), 20.0),
+    ],
+)
+def test_place_and_heading_tell_the_road(position: Position, expected: float) -> None:
+    assert kmh(place_at(TOWN, position, GERMANY, NOW)) == expected
 
 
 def test_without_a_heading_a_crossing_is_unclear_and_so_said() -> None:
@@ -102,6 +104,14 @@ def test_without_a_heading_a_crossing_is_unclear_and_so_said() -> None:
     )
     assert isinstance(place.road, Unknown)
     assert kmh(place_at(TOWN, at(0.0, -300.0), GERMANY, NOW)) == 120.0
+
+
+def ahead_of(town: RoadMap, position: Position) -> RoadAhead:
+    match = town.match(position)
+    assert match is not None
+    ahead = town.ahead(match.best)
+    assert ahead is not None
+    return ahead
 
 
 def right_wrong_unknown(town: RoadMap, truth: list[tuple[float, Position]]) -> tuple[float, float, float]:
@@ -232,6 +242,7 @@ def test_where_a_limit_comes_from_is_told(
 @pytest.mark.parametrize(
     ("highway", "tags", "said"),
     [
+        ("primary", {}, "the map gives none, and no region's rules are loaded"),
         ("track", {}, "the map gives none, and the rules of Germany have none for this class of road"),
         ("motorway_link", {}, "the map gives none, and the rules of Germany have none for this class of road"),
         ("motorway", {"maxspeed": "signals"}, "signs over the road show it, and the map cannot"),
@@ -239,14 +250,8 @@ def test_where_a_limit_comes_from_is_told(
 )
 def test_a_limit_that_nobody_gives_is_not_known(highway: str, tags: dict[str, str], said: str) -> None:
     town = RoadMap([way(1, highway, (0, 0), (0, 500), **tags)])
-    assert place_at(town, at(0.0, 200.0, NORTH), GERMANY, NOW).limit == Unknown(said)
-
-
-def test_without_rules_there_are_no_defaults() -> None:
-    town = RoadMap([way(1, "residential", (0, 0), (0, 500))])
-    assert place_at(town, at(0.0, 200.0, NORTH), None, NOW).limit == Unknown(
-        "the map gives none, and no region's rules are loaded"
-    )
+    rules = None if "no region" in said else GERMANY
+    assert place_at(town, at(0.0, 200.0, NORTH), rules, NOW).limit == Unknown(said)
 
 
 # A road of two ways, a bend at (0, 300), a driveway at (0, 100), a side road at (200, 300).
@@ -274,38 +279,24 @@ STREET = RoadMap([
 def test_the_next_junction_is_measured_along_the_road(
     position: Position, junction_m: float | None, seen_m: float
 ) -> None:
-    match = STREET.match(position)
-    assert match is not None
-    ahead = STREET.ahead(match.best)
-    assert ahead is not None
+    ahead = ahead_of(STREET, position)
     assert ahead.junction_m == (None if junction_m is None else pytest.approx(junction_m, abs=0.5))
     assert ahead.seen_m == pytest.approx(seen_m, abs=0.5)
-
-
-def test_without_a_heading_there_is_no_ahead() -> None:
-    place = place_at(STREET, at(0, 50), None, NOW)
-    assert place.ahead == Unknown("the heading is not known")
+    blind = Position(position.latitude_deg, position.longitude_deg)
+    assert place_at(STREET, blind, None, NOW).ahead == Unknown("the heading is not known")
 
 
 def test_a_road_without_junctions_is_followed_so_far_and_no_farther() -> None:
     town = RoadMap([way(1, "trunk", *((0, 100 * step) for step in range(60)))])
-    match = town.match(at(0, 50, NORTH))
-    assert match is not None
-    ahead = town.ahead(match.best)
-    assert ahead is not None
+    ahead = ahead_of(town, at(0, 50, NORTH))
     assert (ahead.junction_m, ahead.seen_m) == (None, LOOK_AHEAD_M)
     ring = RoadMap([way(1, "primary", (0, 0), (0, 30), (30, 30), (30, 0), (0, 0))])
-    match = ring.match(at(0, 15, NORTH))
-    assert match is not None
-    assert ring.ahead(match.best) is not None
+    ahead_of(ring, at(0, 15, NORTH))  # comes to an end
 
 
 def test_a_road_does_not_go_on_against_a_one_way_street() -> None:
     town = RoadMap([way(1, "primary", (0, 0), (0, 100)), way(2, "primary", (0, 300), (0, 100), oneway="yes")])
-    match = town.match(at(0, 50, NORTH))
-    assert match is not None
-    ahead = town.ahead(match.best)
-    assert ahead is not None
+    ahead = ahead_of(town, at(0, 50, NORTH))
     assert ahead.seen_m == pytest.approx(50.0, abs=0.5)
 
 
@@ -313,10 +304,7 @@ def test_a_map_of_a_circle_does_not_speak_of_what_is_beyond_it() -> None:
     centre = Position(*point(0, 0))
     street = [way(1, "tertiary", *((0, 50 * step) for step in range(40))), way(2, "primary", (-9, 1500), (9, 1500))]
     town = RoadMap(street, extent=(centre, 500.0))
-    match = town.match(at(0, 10, NORTH))
-    assert match is not None
-    ahead = town.ahead(match.best)
-    assert ahead is not None
+    ahead = ahead_of(town, at(0, 10, NORTH))
     assert ahead.junction_m is None
     assert 350.0 < ahead.seen_m < 500.0
     assert town.covers(centre)
@@ -521,21 +509,21 @@ def test_without_its_libraries_it_is_said_what_to_install(
     monkeypatch.setitem(sys.modules, library, None)
     asking: list[Callable[[], object]] = [lambda: load_road_map(path)]
     if library == "shapely":
-        asking += [lambda: RoadMap([]), lambda: ContextServices(ServiceSettings(online=frozenset({"map"})))]
+        asking += [lambda: RoadMap([]), lambda: Sources(SourceSettings(at(0, 0), ["map"]))]
     for ask in asking:
         with pytest.raises(MissingExtraError) as caught:
             ask()
         assert "[map]" in caught.value.hint
 
 
-@pytest.mark.parametrize("numbers", [(91.0, 0.0), (0.0, 181.0), (math.nan, 0.0), (0.0, math.inf)])
-def test_what_is_no_position_is_refused(numbers: tuple[float, float]) -> None:
-    with pytest.raises(ConfigError, match="is not a position"):
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        *((one, "is not a position") for one in ((91.0, 0.0), (0.0, 181.0), (math.nan, 0.0), (0.0, math.inf))),
+        ((0.0, 0.0, math.nan), "heading"),
+        ((0.0, 0.0, None, 0.0), "accuracy"),
+    ],
+)
+def test_what_is_no_position_is_refused(numbers: tuple[Any, ...], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
         Position(*numbers)
-
-
-def test_what_is_no_heading_or_accuracy_is_refused() -> None:
-    with pytest.raises(ConfigError, match="heading"):
-        Position(0.0, 0.0, math.nan)
-    with pytest.raises(ConfigError, match="accuracy"):
-        Position(0.0, 0.0, None, 0.0)

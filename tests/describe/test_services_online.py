@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import math
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -13,16 +14,16 @@ import numpy as np
 import pytest
 from test_services_server import NOW, Asked, reply, roads_json, serving, traffic_json, weather_json
 
-from chauffeur.concept import ConfigError
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.describe.services import (
-    ContextServices,
     Position,
     ServiceReading,
-    ServiceSettings,
+    Sources,
+    SourceSettings,
     Surroundings,
     Unknown,
 )
-from chauffeur.describe.services.settings import ONLINE, Online
+from chauffeur.describe.services.sources import ONLINE, Online
 from chauffeur.describe.services.traffic import read_traffic
 
 pytestmark = pytest.mark.server
@@ -51,7 +52,7 @@ class Clock:
 class Car:
     """Services of one car in a test."""
 
-    services: ContextServices
+    services: Sources
     clock: Clock
     spent_s: list[float] = field(default_factory=list)
 
@@ -72,18 +73,10 @@ def drive(
     keys: dict[str, str] | None = None,
 ) -> Car:
     """Run a test's steps with services at these addresses; an empty one is not asked."""
-    online: set[Online] = {name for name, url in zip(ONLINE, (weather, roads, traffic), strict=True) if url}
-    settings = ServiceSettings(
-        online=frozenset(online),
-        weather_url=weather or "https://weather.invalid",
-        map_url=roads or "https://map.invalid",
-        traffic_url=traffic or "https://traffic.invalid",
-        patience_s=patience_s,
-    )
+    urls: dict[Online, str] = {name: url for name, url in zip(ONLINE, (weather, roads, traffic), strict=True) if url}
     clock = Clock()
-    services = ContextServices(
-        settings, clock=clock, environ=KEYS if keys is None else keys, rng=np.random.default_rng(1)
-    )
+    settings = SourceSettings(HERE, tuple(urls), urls, patience_s=patience_s)
+    services = Sources(settings, clock=clock, environ=KEYS if keys is None else keys, rng=np.random.default_rng(1))
     car = Car(services, clock)
 
     async def whole() -> None:
@@ -112,7 +105,7 @@ class Sometimes:
         return everything(asked) if self.up else reply("", "503 Service Unavailable")
 
 
-def test_all_at_once() -> None:
+def test_all_at_once_and_what_the_services_are_told() -> None:
     async def steps(car: Car) -> None:
         found = await car.around()
         assert found.words() == (
@@ -134,14 +127,6 @@ def test_all_at_once() -> None:
     with serving(everything) as service:
         drive(steps, weather=service.url, roads=service.url, traffic=service.url)
     assert len(service.asked) == 3
-
-
-def test_what_the_services_are_told() -> None:
-    async def steps(car: Car) -> None:
-        await car.around()
-
-    with serving(everything) as service:
-        drive(steps, weather=service.url, roads=service.url, traffic=service.url)
     by_path = {one.path: one for one in service.asked}
     weather = by_path["/data/2.5/weather"]
     assert weather.query == {"lat": "48.137", "lon": "11.575", "units": "metric", "appid": SECRET}
@@ -172,24 +157,20 @@ def test_they_are_asked_side_by_side() -> None:
     assert 0.4 <= car.spent_s[0] < 1.2 - 1e-3
 
 
-def test_nothing_is_asked_of_nobody() -> None:
-    async def steps(car: Car) -> None:
+def test_what_is_not_switched_on_or_has_no_key_is_not_asked() -> None:
+    async def nothing_on(car: Car) -> None:
         found = await car.around()
-        assert found.weather == Unknown("no such service is switched on")
-        assert found.traffic == Unknown("no such service is switched on")
+        assert found.weather == found.traffic == Unknown("no such service is switched on")
         assert found.road == Unknown("no map is loaded")
 
-    drive(steps)
-
-
-def test_without_a_key_nothing_is_asked() -> None:
-    async def steps(car: Car) -> None:
+    async def no_keys(car: Car) -> None:
         found = await car.around()
         assert found.weather == Unknown("there is no key: OPENWEATHER_API_KEY is not set")
         assert found.traffic == Unknown("there is no key: TOMTOM_API_KEY is not set")
 
+    drive(nothing_on)
     with serving(everything) as service:
-        drive(steps, weather=service.url, traffic=service.url, keys={})
+        drive(no_keys, weather=service.url, traffic=service.url, keys={})
     assert service.asked == []
 
 
@@ -209,29 +190,19 @@ def test_a_silent_service_costs_the_budget_and_no_more() -> None:
     assert len(silent.asked) == 1  # one at a time, however often it is wished for
 
 
-def test_no_budget_at_all_tells_what_is_known() -> None:
-    async def steps(car: Car) -> None:
-        found = await car.around(budget_s=0.0)
-        assert isinstance(found.weather, Unknown)
-        await car.around()
-        found = await car.around(budget_s=0.0)
-        assert isinstance(found.weather, ServiceReading)
-
-    with serving(everything) as service:
-        drive(steps, weather=service.url)
-    assert len(service.asked) == 1
-
-
 def test_an_answer_that_is_late_is_there_the_next_time() -> None:
     def slowly(asked: Asked) -> bytes:
-        time.sleep(0.5)
+        time.sleep(0.3)
         return everything(asked)
 
     async def steps(car: Car) -> None:
-        first = await car.around(budget_s=0.05)
-        assert isinstance(first.weather, Unknown)
-        second = await car.around()
-        assert isinstance(second.weather, ServiceReading)
+        for budget_s in (0.0, 0.05):
+            assert isinstance((await car.around(budget_s=budget_s)).weather, Unknown)
+        cancelled = asyncio.ensure_future(car.around())
+        await asyncio.sleep(0.05)
+        cancelled.cancel()  # which leaves the request to the next one
+        for budget_s in (LATE, 0.0):
+            assert isinstance((await car.around(budget_s=budget_s)).weather, ServiceReading)
 
     with serving(slowly) as service:
         drive(steps, weather=service.url)
@@ -338,46 +309,31 @@ def test_the_key_is_in_no_log_and_no_error(caplog: pytest.LogCaptureFixture) -> 
 
 @pytest.mark.parametrize("key", ["two words", "línea", "a\nb"])
 def test_what_is_no_key_is_refused_and_not_shown(key: str) -> None:
-    settings = ServiceSettings(online=frozenset({"weather"}))
     with pytest.raises(ConfigError, match="OPENWEATHER_API_KEY") as caught:
-        ContextServices(settings, environ={"OPENWEATHER_API_KEY": key})
+        Sources(SourceSettings(HERE, ["weather"]), environ={"OPENWEATHER_API_KEY": key})
     assert key not in str(caught.value)
-
-
-def test_a_key_does_not_cross_a_public_network_unencrypted() -> None:
-    settings = ServiceSettings(online=frozenset({"traffic"}), traffic_url="http://traffic.example.com")
     with pytest.raises(ConfigError, match="unencrypted"):
-        ContextServices(settings, environ=KEYS)
+        Sources(SourceSettings(HERE, ["traffic"], {"traffic": "http://traffic.example.com"}), environ=KEYS)
 
 
 @pytest.mark.parametrize(
     "changed",
     [
-        {"map_url": "ftp://x"},
-        {"map_url": "http://user:sesame@host/"},
-        {"map_url": "http://host/?key=1"},
-        {"map_url": "http://[::1"},
-        {"weather_url": ""},
-        {"patience_s": 0.0},
-        {"patience_s": float("nan")},
-        {"weather_decimals": 9},
-        {"online": frozenset({"astrology"})},
+        {"urls": {"map": "ftp://x"}},
+        {"urls": {"map": "http://user:sesame@host/"}},
+        {"urls": {"map": "http://host/?key=1"}},
+        {"urls": {"map": "http://[::1"}},
+        {"urls": {"weather": ""}},
+        *({"patience_s": given} for given in (0.0, math.nan)),
+        *({"budget_s": given} for given in (-1.0, math.nan, math.inf, 1e9)),
+        {"online": ["astrology"]},
     ],
 )
 def test_settings_that_cannot_be_used(changed: dict[str, object]) -> None:
     with pytest.raises(ConfigError) as caught:
-        ServiceSettings(**changed)  # pyright: ignore[reportArgumentType]
+        SourceSettings(HERE, **changed)  # pyright: ignore[reportArgumentType]
     assert caught.value.hint
     assert "sesame" not in str(caught.value)
-
-
-@pytest.mark.parametrize("budget_s", [-1.0, float("nan"), float("inf"), 1e9])
-def test_budgets_that_cannot_be_used(budget_s: float) -> None:
-    async def steps(car: Car) -> None:
-        with pytest.raises(ConfigError):
-            await car.around(budget_s=budget_s)
-
-    drive(steps)
 
 
 def test_weather_is_kept_ten_minutes_for_a_kilometre() -> None:
@@ -550,9 +506,10 @@ def test_roads_are_kept_for_the_circle() -> None:
         ("<?xml version='1.0'?><osm><remark>Error</remark></osm>", "the answer is not JSON"),
         ('{"elements": 7}', "not one of a map service"),
         ("[]", "not one of a map service"),
+        (roads_json(), "the map has no road here that points the same way"),
     ],
 )
-def test_a_map_service_that_fails(body: str, said: str) -> None:
+def test_a_map_service_that_fails_or_knows_no_road(body: str, said: str) -> None:
     async def steps(car: Car) -> None:
         found = await car.around()
         for known in (found.road, found.limit, found.ahead):
@@ -560,15 +517,6 @@ def test_a_map_service_that_fails(body: str, said: str) -> None:
             assert said in known.reason
 
     with serving(lambda _: reply(body)) as service:
-        drive(steps, roads=service.url)
-
-
-def test_an_empty_place_has_no_road() -> None:
-    async def steps(car: Car) -> None:
-        found = await car.around()
-        assert found.road == Unknown("the map has no road here that points the same way")
-
-    with serving(lambda _: reply(roads_json())) as service:
         drive(steps, roads=service.url)
 
 
@@ -638,9 +586,8 @@ def test_without_a_heading_a_segment_has_to_be_nearer() -> None:
      {"confidence": True}],
 )  # fmt: skip
 def test_traffic_that_is_nonsense_is_not_told(changed: dict[str, object]) -> None:
-    told = traffic_of(STREET, **changed)
-    assert isinstance(told, Unknown)
-    assert "the answer is not one about traffic" in told.reason
+    with pytest.raises(DataError, match="not one about traffic"):
+        read_traffic(traffic_json(STREET, **changed).encode())
 
 
 def test_a_road_that_does_not_fit_is_not_asked_for_again_at_once() -> None:
@@ -700,11 +647,8 @@ def test_what_a_service_writes_does_not_reach_the_words() -> None:
 def test_services_live_through_a_change_of_event_loop() -> None:
     clock = Clock()
     with serving(everything) as service, serving(lambda _: None) as silent:
-        services = ContextServices(
-            ServiceSettings(online=frozenset({"weather", "traffic"}), weather_url=service.url, traffic_url=silent.url),
-            clock=clock,
-            environ=KEYS,
-        )
+        urls: dict[Online, str] = {"weather": service.url, "traffic": silent.url}
+        services = Sources(SourceSettings(HERE, tuple(urls), urls), clock=clock, environ=KEYS)
         for _ in range(2):
             found = asyncio.run(services.around(HERE, budget_s=1.0))
             clock.now += 1_000.0
@@ -720,22 +664,6 @@ def test_many_at_once_ask_once() -> None:
         assert all(isinstance(one.weather, ServiceReading) for one in found)
 
     with serving(everything) as service:
-        drive(steps, weather=service.url)
-    assert len(service.asked) == 1
-
-
-def test_a_caller_that_is_cancelled_leaves_the_request_to_the_next_one() -> None:
-    def slowly(asked: Asked) -> bytes:
-        time.sleep(0.3)
-        return everything(asked)
-
-    async def steps(car: Car) -> None:
-        first = asyncio.ensure_future(car.around())
-        await asyncio.sleep(0.05)
-        first.cancel()
-        assert isinstance((await car.around()).weather, ServiceReading)
-
-    with serving(slowly) as service:
         drive(steps, weather=service.url)
     assert len(service.asked) == 1
 

@@ -97,7 +97,7 @@ traffic = "{service.url}"
         ('online = ["astrology"]\n[position]\nat = [1.0, 2.0]\n', "online"),
         ("budget_s = 100.0\n[position]\nat = [1.0, 2.0]\n", "budget_s"),
         ("colour = 3\n[position]\nat = [1.0, 2.0]\n", "colour"),
-        ("= 3", "no TOML"),
+        ("= 3", "not TOML"),
     ],
 )
 def test_files_that_cannot_be_used(tmp_path: Path, text: str, said: str) -> None:

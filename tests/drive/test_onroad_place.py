@@ -111,7 +111,7 @@ def test_a_limit_that_falls_while_it_is_planned(tmp_path: Path) -> None:
 
     async def answer(request: PlanRequest) -> Plan:
         limits[:] = ["20"]
-        sources_of[0]._services._map._kept.clear()  # type: ignore[union-attr]
+        sources_of[0]._map._kept.clear()  # type: ignore[union-attr]
         await sources_of[0].look(5.0)
         return Plan(Thoughts(""), Parameters(9.0, 8.0, 2.0))
 
@@ -155,7 +155,7 @@ def test_sources_that_break_are_said(tmp_path: Path, embedded: Planner, monkeypa
         raise ZeroDivisionError
 
     async def steps(road: VehicleSession, sources: Sources) -> None:
-        monkeypatch.setattr(sources._services, "around", broken)
+        monkeypatch.setattr(sources, "around", broken)
         found = await sources.look()
         assert isinstance(found, Unknown)
         assert (await road.ask("Drive at 20 km/h.")).status == "dry-run"

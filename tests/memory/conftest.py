@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from memory_trips import Clock, context
+from memory_trips import Clock, chroma_memory, context
 
 from chauffeur.concept import Instruction, PersonId
-from chauffeur.memory import VaultMemory, cipher
+from chauffeur.memory import Memory, VaultMemory, cipher
 
 
 @pytest.fixture
@@ -37,12 +37,19 @@ def vault(tmp_path: Path, clock: Clock) -> VaultMemory:
     return VaultMemory(tmp_path / "home", clock=clock)
 
 
+@pytest.fixture(params=["vault", "chroma"])
+def memory(request: pytest.FixtureRequest, tmp_path: Path, clock: Clock) -> Memory:
+    """Each memory that ships, in turn."""
+    home = tmp_path / "home"
+    return VaultMemory(home, clock=clock) if request.param == "vault" else chroma_memory(home, clock)
+
+
 @pytest.fixture
 def wishes() -> Callable[..., list[str]]:
     """Wishes recalled for a person, nearest first."""
 
-    def recall(vault: VaultMemory, person: str, text: str = "Drive faster", k: int = 10) -> list[str]:
-        history = vault.recall(PersonId(person), Instruction(text), context(), k)
+    def recall(memory: Memory, person: str, text: str = "Drive faster", k: int = 10) -> list[str]:
+        history = memory.recall(PersonId(person), Instruction(text), context(), k)
         return [item.instruction for item in history.items]
 
     return recall

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
 
 from chauffeur.concept import (
     Causes,
@@ -18,6 +21,7 @@ from chauffeur.concept import (
     Thoughts,
     Trip,
 )
+from chauffeur.memory.chroma import ChromaMemory
 
 
 @dataclass
@@ -51,3 +55,9 @@ def trip(
         id, Instruction(text, PersonId(person)), context(world, where), History(), plan, (), "success", Causes(), (),
         12.0, "s", 1,
     )  # fmt: skip
+
+
+def chroma_memory(home: Path, clock: Clock) -> ChromaMemory:
+    """An empty memory in Chroma; skips the test where that is not installed."""
+    pytest.importorskip("chromadb", reason="Chroma is not installed: pip install 'chauffeur[chroma]'")
+    return ChromaMemory(home, clock=clock)

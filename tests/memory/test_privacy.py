@@ -13,6 +13,8 @@ from chauffeur.concept import ConfigError, PersonId
 from chauffeur.memory import VaultMemory
 from chauffeur.memory.privacy import PRIVACY_FILE, RETENTION_DAYS, Privacy, read_privacy, write_privacy
 
+pytestmark = pytest.mark.usefixtures("unsynced")
+
 Wishes = Callable[..., list[str]]
 ANN = PersonId("Ann")
 

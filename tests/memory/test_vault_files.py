@@ -14,6 +14,8 @@ from chauffeur.memory import VaultMemory
 from chauffeur.memory.files import NotPlainFileError, open_plain, publish, read_plain, write_new
 from chauffeur.memory.keys import KeyRing
 
+pytestmark = pytest.mark.usefixtures("unsynced")
+
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
 
 

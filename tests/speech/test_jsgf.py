@@ -65,10 +65,10 @@ def test_the_planner_understands_what_the_grammar_hears() -> None:
     rng = np.random.default_rng(4)
     elsewhere = ("street", "destination", "weather", "park")  # what planners of towns, lots and the test track read
     intents = [intent for intent in grammar.members("wish") if intent not in elsewhere]
-    said = [grammar.sample(intent, rng) for intent in intents for _ in range(60)]
+    said = [grammar.sample(intent, rng) for intent in intents for _ in range(30)]
     missed = [one for one in said if not meanings_said(one)]
     assert len(missed) <= 0.03 * len(said), missed
-    for _ in range(60):
+    for _ in range(20):
         assert suiting(grammar.sample("destination", rng)).world == "town"
         assert suiting(grammar.sample("weather", rng)).world == "track"
 
@@ -85,7 +85,7 @@ def test_what_scenarios_are_listed_with_can_be_said() -> None:
 def test_the_safe_intents_mean_slower_and_stop() -> None:
     grammar = driving_grammar()
     rng = np.random.default_rng(5)
-    for _ in range(60):
+    for _ in range(30):
         slower = meanings_said(grammar.sample("slower", rng))
         assert slower and all(step.manoeuvre == "speed" and step.change == -1 for step in slower), slower
         stop = meanings_said(grammar.sample("stop", rng))

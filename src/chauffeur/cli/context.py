@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from chauffeur.cli.examples import help_text
 
 if TYPE_CHECKING:
-    from chauffeur.describe.services import Position, ServiceSettings, Surroundings
+    from chauffeur.describe.services import Position, Surroundings
     from chauffeur.describe.services.surroundings import Row
 
 EXAMPLES = help_text("context")
@@ -32,16 +32,22 @@ def context(
     """Tell what a driving context would say of a place: weather, road, limit, traffic, rules; with ages and sources."""
     import asyncio
 
-    from chauffeur.describe.services import ContextServices, load_road_map, load_rules
+    from chauffeur.describe.services import Sources, SourceSettings, load_road_map, load_rules
 
+    urls: dict[Any, str] = {name: url for name, _, url in (one.partition("=") for one in online or [])}
     here = position(at, heading, accuracy)
-    settings = _settings(online or [])
-    rules = load_rules(region) if region else None
-    road_map = load_road_map(map_file) if map_file is not None else None
+    settings = SourceSettings(
+        here,
+        tuple(urls),
+        {name: url for name, url in urls.items() if url},
+        rules=load_rules(region) if region else None,
+        road_map=load_road_map(map_file) if map_file is not None else None,
+        budget_s=budget,
+    )
 
     async def tell() -> None:
-        async with ContextServices(settings, rules=rules, road_map=road_map) as services:
-            found = await services.around(here, budget_s=budget)
+        async with Sources(settings) as sources:
+            found = await sources.around(here, budget_s=budget)
             # Told before the services are closed: a resolver of names that hangs would hold up the closing.
             if as_json:
                 _print_json(found)
@@ -67,23 +73,6 @@ def position(at: str, heading: float | None, accuracy: float) -> Position:
             f"{at!r} is not a place.", hint="Give latitude and longitude in degrees, e.g. --at 48.137,11.575"
         ) from error
     return Position(latitude, longitude, heading, accuracy)
-
-
-def _settings(online: list[str]) -> ServiceSettings:
-    from chauffeur.concept import ConfigError
-    from chauffeur.describe.services import ServiceSettings
-    from chauffeur.describe.services.settings import MAP_URL, ONLINE, TRAFFIC_URL, WEATHER_URL
-
-    urls = {name: url for name, _, url in (one.partition("=") for one in online)}
-    for name in urls:
-        if name not in ONLINE:
-            raise ConfigError(f"There is no online service {name!r}.", hint=f"Known: {', '.join(ONLINE)}.")
-    return ServiceSettings(
-        online=frozenset(name for name in ONLINE if name in urls),
-        weather_url=urls.get("weather") or WEATHER_URL,
-        map_url=urls.get("map") or MAP_URL,
-        traffic_url=urls.get("traffic") or TRAFFIC_URL,
-    )
 
 
 def _print_words(found: Surroundings) -> None:

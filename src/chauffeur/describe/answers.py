@@ -13,60 +13,21 @@ from typing import Final
 from chauffeur.concept import Context, Situation
 from chauffeur.concept.units import people_speed
 from chauffeur.describe.road import SIGHT_M, ordinal
-from chauffeur.language.questions import ADDRESS
-from chauffeur.language.tokens import words_of
+from chauffeur.language.inquiries import Topic, topics_of
 from chauffeur.worlds.places import Destination
 
 DONT_KNOW: Final = "I don't know that. I can tell our speed, the limit, our lane and who is ahead."
 
-_US: Final = r"(?:i|we|you|it|he|the car)"
-_WHY_STANDING: Final = re.compile(
-    rf"{ADDRESS}why (?:(?:are|did|do|have|is|has) {_US} (?:just |now |still |all )?"
-    r"(?:stand\w*|stop\w*|wait\w*|brak\w*|slow(?:ed|ing)|still)|"
-    rf"(?:are|is) (?:not {_US}|{_US} (?:still )?not) (?:moving|driving|going))"
-    r"(?: (?:here|now|there|down|still|for|at all|anywhere))*$"
-)
-"""Why the car stands or brakes; not a complaint that it is slow, which is a wish."""
 _IN_THE_WAY: Final = re.compile(r"light [^.]{0,40}(?:red|yellow)|on foot|stop sign")
 _SENTENCE_ENDS: Final = re.compile(r"(?<=[a-z])\. ")
 _STANDS_BEHIND_M: Final = 25.0
 """A car this near ahead, centre to centre, may be why one brakes or waits."""
 _NO_REASON: Final = "I see no light, sign, car or person ahead that would hold us up."
 
-_MAY: Final = r"(?:may|can|could|should|must)"
-_WE: Final = r"(?:i|we|you|one)"
-_ASKS: Final = re.compile(
-    rf"{ADDRESS}"
-    r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
-    r"tell (?:me|us) |i wonder )?"
-    r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
-    r"is there|are there|is it|are we (?:nearly |almost |soon |about )?there|will we (?:arrive|be there) soon)\b"
-)
-"""How a question begins that wants to know something; not one that asks for something, complains or proposes."""
-_PROPOSES: Final = re.compile(
-    r"^what (?:about|if|are you (?:doing|waiting)|the|a|do you think you)\b|\bhow about\b|"
-    r"\bwhat is (?:taking|the (?:hold|matter|point|rush))\b|^when (?:you|we|he|she|it|there|the)\b"
-)
-_THEIRS: Final = (
-    r"(?:he|she|they|him|her|it|"
-    r"(?:the|that|this) (?:\w+ )?(?:car|vehicle|truck|van|lorry|bus|one|guy|driver|front|lead)\b.*)"
-)
-_AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
-
-
 _WAY: Final = "way"
 """Name of the fact how far it is to where the car is going."""
 _DOING: Final = "doing"
 """Name of the fact what is driven, and what became of what was driven last."""
-_ABOUT_DOING: Final = re.compile(
-    rf"{ADDRESS}(?:what (?:are|were) {_US} doing(?: now| here| there| right now)?$|"
-    rf"what (?:did|have) {_US} (?:just )?(?:do|done)(?: now| there| just now)?$|"
-    rf"did {_US} (?:do|finish) (?:it|that)(?: already| yet)?$|"
-    rf"are {_US} (?:doing|still doing) (?:it|that)(?: now| yet)?$|"
-    rf"why (?:are|were|did|do|have|has|is) {_US} (?:just |now |still |all )?"
-    r"(?:chang|overtak|pass|turn|follow|accelerat|speed(?:ing)? up|mov|cross|merg|leav|pull)\w*\b)"
-)
-"""Asks about what the car does or did; answered by its execution."""
 
 
 def _speed(speed_mps: float) -> str:
@@ -134,60 +95,11 @@ def _of_scene(name: str) -> Callable[[Situation], str]:
     return lambda situation: dict(situation.scene).get(name, "")
 
 
-_TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] = tuple(
-    (re.compile("|".join(patterns)), answer)
-    for patterns, answer in (
-        (
-            (
-                r"\b(?:are|were) we (?:\w+ )?there\b|\bwhen (?:do|will|are) we (?:arrive|get there|be there|there)\b",
-                r"\bhow (?:far|long(?! (?:ha|is|was|did))|much longer|many minutes|soon)\b"
-                r"(?!.*\b(?:ahead|front|away|behind)\b)",
-                r"\bwhere (?:are we (?:going|heading)|are you taking)\b|\bwill we (?:arrive|be there) soon\b",
-            ),
-            _of_scene(_WAY),
-        ),
-        ((r"\b(?:weather|raining|rain|snowing|foggy|forecast)\b(?! tomorrow)",), _of_scene("weather")),
-        ((r"\btraffic (?:like|ahead|rules?)\b|\btraffic$",), _of_scene("traffic")),
-        (
-            (
-                r"\b(?:which|what) (?:road|street|highway|motorway) (?:is this|are we|am i)\b",
-                r"^where are we\b",
-                r"\b(?:whats?|what is) (?:this|the name of (?:this|the)) (?:road|street)\b",
-                r"\b(?:road|street) (?:name|called)\b|\bhow (?:it is|is it|is this (?:road|street)) called\b",
-            ),
-            _of_scene("road"),
-        ),
-        (
-            (
-                rf"\blimit\b|\bmaximum speed\b|\bhow fast (?:{_MAY}|{_WE} {_MAY})\b",
-                rf"\bhow fast (?:am|are|is) {_WE} allowed\b",
-            ),
-            _limit,
-        ),
-        ((rf"\bhow fast (?:is|are|was|does|do) {_THEIRS}", rf"\bspeed of (?:the|that) \w+ {_AHEAD}\b"), _front),
-        (
-            (
-                r"\bhow fast (?:am|are|is|do) (?:i|we|you|it|this)\b",
-                r"\b(?:our|my|your|current) speed\b|\bspeed (?:are|am|is) (?:we|i|it|this)\b|\bthe speed$",
-            ),
-            _own_speed,
-        ),
-        ((r"\bstop sign\b",), _stop_sign),
-        ((r"\b(?:which|what) lane\b|\bhow many lanes\b",), _lane),
-        (
-            (rf"\b(?:which way|where) {_MAY} {_WE} (?:turn|go)\b", r"\b(?:junction|crossing|intersection)\b"),
-            _turns,
-        ),
-        (
-            (
-                rf"\bhow (?:far|close|much (?:room|space|distance))\b.*\b{_AHEAD}\b|\b(?:distance|gap|headway)\b",
-                rf"\b(?:any(?:one|body)|some(?:one|body)|nobody|who|what|car|vehicle)\b.*\b{_AHEAD}\b",
-                r"^how (?:far|close) (?:away )?(?:is|are) (?:he|she|they|it)\b",
-            ),
-            _front,
-        ),
-    )
-)
+_ANSWERS: Final[dict[Topic, Callable[[Situation], str]]] = {
+    "doing": _of_scene(_DOING), "way": _of_scene(_WAY), "weather": _of_scene("weather"),
+    "traffic": _of_scene("traffic"), "road": _of_scene("road"), "limit": _limit, "front": _front, "speed": _own_speed,
+    "stop sign": _stop_sign, "lane": _lane, "turns": _turns,
+}  # fmt: skip
 
 
 def _held_up(situation: Situation, seen: str) -> str:
@@ -200,12 +112,6 @@ def _held_up(situation: Situation, seen: str) -> str:
     return f"{told}." if told else _NO_REASON
 
 
-def asks_to_know(text: str) -> bool:
-    """Whether words ask for knowledge and for nothing to be done."""
-    words = words_of(text).rstrip(" ?.!")
-    return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
-
-
 def answer_to(text: str, situation: Situation, seen: str = "") -> str:
     """What C says to a question about it; empty where it is no such question, or C does not hold the answer.
 
@@ -214,11 +120,8 @@ def answer_to(text: str, situation: Situation, seen: str = "") -> str:
         situation: C as numbers.
         seen: C in words.
     """
-    words = words_of(text).rstrip(" ?.!")
-    if _ABOUT_DOING.match(words) and (doing := dict(situation.scene).get(_DOING, "")):
-        return doing
-    if _WHY_STANDING.match(words):
-        return _held_up(situation, seen)
-    if not asks_to_know(text):
-        return ""
-    return next((said for pattern, answer in _TOPICS if pattern.search(words) and (said := answer(situation))), "")
+    for topic in topics_of(text):
+        said = _held_up(situation, seen) if topic == "standing" else _ANSWERS[topic](situation)
+        if said:
+            return said
+    return ""

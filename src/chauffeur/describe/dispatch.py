@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -18,10 +17,8 @@ from chauffeur.describe.road import (
 )
 from chauffeur.describe.town import describe_town
 from chauffeur.describe.track import describe_track
+from chauffeur.geometry import Pose
 
-_STRAIGHT_RAD = math.radians(30.0)
-_BACK_RAD = math.radians(150.0)
-_ORDER: tuple[Turn, ...] = ("left", "straight", "right")
 _WORDS: dict[Turn, str] = {"left": "turn left", "straight": "go straight", "right": "turn right"}
 
 
@@ -82,17 +79,12 @@ def describe_parking(observation: Observation) -> Context:
 
 def _seen_from(ego: VehicleState, lot: ParkingLot) -> ParkingLot:
     """A lot of the world frame in the ego's."""
-    c, s = math.cos(ego.heading_rad), math.sin(ego.heading_rad)
-
-    def at(x_m: float, y_m: float) -> tuple[float, float]:
-        dx, dy = x_m - ego.x_m, y_m - ego.y_m
-        return c * dx + s * dy, c * dy - s * dx
-
+    pose = Pose(ego.x_m, ego.y_m, ego.heading_rad)
     spots: list[ParkingSpot] = []
     for spot in lot.spots:
-        x, y = at(spot.x_m, spot.y_m)
+        x, y = pose.sees(spot.x_m, spot.y_m)
         spots.append(replace(spot, x_m=x, y_m=y, heading_rad=spot.heading_rad - ego.heading_rad))
-    return ParkingLot(tuple(spots), tuple((name, *at(x, y)) for name, x, y in lot.landmarks))
+    return ParkingLot(tuple(spots), tuple((name, *pose.sees(x, y)) for name, x, y in lot.landmarks))
 
 
 def describe_highway(observation: Observation) -> Context:

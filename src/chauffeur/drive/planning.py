@@ -44,11 +44,12 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
-from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
+from chauffeur.describe.answers import DONT_KNOW, answer_to
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.drive.judge import account
 from chauffeur.language.emergency import read_emergency
+from chauffeur.language.inquiries import asks_to_know
 from chauffeur.language.languages.reader import OtherWish, read_other
 from chauffeur.language.meaning.reader import Turn, turn_of
 from chauffeur.language.questions import is_question

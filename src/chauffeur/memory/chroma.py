@@ -10,40 +10,29 @@ everywhere chooses among them.
 from __future__ import annotations
 
 import json
-import logging
 import math
 import os
 import secrets
 import struct
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.concept import (
-    Context,
-    Feedback,
-    History,
-    HistoryItem,
-    Instruction,
-    MissingExtraError,
-    PersonId,
-    ProfileError,
-    Trip,
-)
+from chauffeur.concept import Feedback, HistoryItem, MissingExtraError, PersonId, Trip
 from chauffeur.concept.data import data_home
 from chauffeur.language.weather import weather_of
 from chauffeur.memory.columns import Columns, Entry, packed
 from chauffeur.memory.files import locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing, same_name
-from chauffeur.memory.privacy import Privacy, is_somebody, read_privacy, stamp, utc_now
+from chauffeur.memory.privacy import Privacy, read_privacy, utc_now
+from chauffeur.memory.profile_memory import ProfileMemory
 from chauffeur.memory.records import MAX_CHARS, body_of, feedback_body, item_of
-from chauffeur.memory.retrieval import UNCOMPARED, nearest
 from chauffeur.memory.similarity import DIMENSIONS, MEANING_SHARE, TAGS, TEXT_SHARE, Mark, Vector, mark
 
 FORMAT: Final = "chauffeur-chroma-1"
@@ -58,17 +47,13 @@ _BATCH: Final = 1_000
 _INDEX: Final = struct.Struct("<i4Q")
 """How `header.bin` of an index begins (hnswlib, `saveIndex`): version, offset, room, elements, bytes of each."""
 
-_log = logging.getLogger(__name__)
 
+class ChromaMemory(ProfileMemory):
+    """Memory in Chroma's files on this machine, not encrypted; safe for several processes, one after another."""
 
-class ChromaMemory:
-    """Memory in Chroma's files on this machine, not encrypted; safe for several processes, one after another.
-
-    Attributes:
-        encrypts: As for `VaultMemory`.
-    """
-
-    encrypts: ClassVar = False
+    encrypts = False
+    _format = FORMAT
+    _failures = (BaseException,)  # Chroma names no family of errors, and its core panics past `Exception`
 
     def __init__(
         self, home: Path | None = None, *, privacy: Privacy | None = None, clock: Callable[[], datetime] = utc_now
@@ -88,214 +73,34 @@ class ChromaMemory:
         except ImportError as error:
             raise MissingExtraError("The memory 'chroma' needs Chroma.", extra="chroma") from error
         root = data_home() if home is None else home
-        self._root = root / "chroma"
-        self._names = KeyRing(self._root, in_use=lambda: any(one.is_dir() for one in self._root.glob("*")))
-        self._privacy = read_privacy(root) if privacy is None else privacy
-        self._clock = clock
+        ring = KeyRing(root / "chroma", in_use=lambda: bool(self._aliases()))
+        super().__init__(root / "chroma", ring, read_privacy(root) if privacy is None else privacy, clock)
 
-    def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
-        """As `Memory.recall`, among the wishes that Chroma finds nearest."""
-        now, wish, place = self._clock(), mark(instruction.text), context.situation
-        since = self._privacy.since(now)
-        with self._reading(person) as store:
-            if store is None or k <= 0:
-                return History()
-            columns = Columns()
-            columns.extend(store.proposed(wish))
-            found = nearest(columns, wish, place.world, weather_of(place), now, k, since=since)
-            return History(tuple(store.item(row, similarity) for row, similarity in found))
+    def _aliases(self) -> list[str]:
+        return sorted(one.name for one in self._folder.glob("*") if one.is_dir())
 
-    def latest(self, person: PersonId, world: str, k: int) -> History:
-        """As `Memory.latest`; it reads every trip."""
-        keep_from = self._privacy.keep_from(self._clock())
-        with self._reading(person) as store:
-            if store is None or k <= 0:
-                return History()
-            judged = [row for row in store.rows() if row.feedback and row.at >= keep_from]
-            items = [row.item(UNCOMPARED) for row in judged]
-            return History(tuple([item for item in items if item.world == world][-k:][::-1]))
+    @contextmanager
+    def _open(self, alias: str, person: PersonId | None = None) -> Generator[_Profile | None]:
+        with self._errors(alias if person is None else person), self._locked():
+            folder = self._folder / alias
+            yield None if _current(folder) is None else _Profile(self._chroma, folder, person)
 
-    def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
-        """As `Memory.remember`; what is older than the retention goes."""
-        person = trip.instruction.person
-        if not is_somebody(person) or not self._privacy.keeps:
-            return
+    @contextmanager
+    def _made(self, person: PersonId) -> Generator[_Profile]:
         with self._errors(person):
-            private_directory(self._root)
+            private_directory(self._folder)
             with self._locked():
-                folder, when = self._folder(person), stamp(self._clock())
-                if not self._add(folder, trip, feedback, when):
-                    self._leave_older(person, folder)
-                    self._add(folder, trip, feedback, when)
+                yield _Profile(self._chroma, self._folder / self._ring.alias(person), person)
 
-    def attach_feedback(self, person: PersonId, feedback: Feedback, trip_id: str | None = None) -> bool:
-        """As `Memory.attach_feedback`."""
-        with self._reading(person) as store:
-            return store is not None and store.add_feedback(feedback, stamp(self._clock()), trip_id)
-
-    def export(self, person: PersonId) -> str:
-        """As `Memory.export`."""
-        with self._reading(person) as store:
-            trips = [] if store is None else [row.exported() for row in store.rows()]
-        document = {"format": FORMAT, "person": person, "exported": stamp(self._clock()), "trips": trips}
-        return json.dumps(document, indent=2)
-
-    def forget_last(self, person: PersonId) -> HistoryItem | None:
-        """As `Memory.forget_last`: all other trips are written anew."""
-        if not is_somebody(person) or not self._root.exists():
-            return None
-        with self._errors(person), self._locked():
-            folder = self._folder(person)
-            if _current(folder) is None:
-                return None
-            with self._store(folder, person) as store:
-                rows = list(store.rows())
-            if not rows:
-                return None
-            self._rewrite(folder, person, rows[:-1])
-            return rows[-1].item()
-
-    def erase(self, person: PersonId) -> bool:
-        """As `Memory.erase`, of damaged profiles too; with the salt lost, of those that still say whose they are."""
-        if not is_somebody(person) or not self._root.exists():
-            return False
-        with self._errors(person), self._locked():
-            try:
-                folders = [self._folder(person)]
-            except ProfileError:
-                folders = [folder for folder, name in self._names_said() if same_name(name) == same_name(person)]
-                if not folders:
-                    raise
-            there = [folder for folder in folders if folder.exists()]
+    def _destroy(self, aliases: Iterable[str]) -> bool:
+        with self._locked():
+            there = [folder for folder in map(self._folder.joinpath, aliases) if folder.exists()]
             for folder in there:
                 _destroy(folder)
-            return bool(there)
+        return bool(there)
 
-    def _names_said(self) -> Iterator[tuple[Path, PersonId]]:
-        """Folders with the names that their profiles say, whether or not the folder's own name fits."""
-        for folder in sorted(one for one in self._root.glob("*") if one.is_dir()):
-            with suppress(ProfileError), self._errors(folder.name):
-                current = _current(folder)
-                if current is not None:
-                    with self._opened(current, "", fits=False) as store:
-                        yield folder, store.person
-
-    def sweep(self) -> int:
-        """Delete every trip that is older than the retention, of everybody; how many there were."""
-        swept = 0
-        for person in self.people():
-            with self._errors(person), self._locked():
-                swept += self._leave_older(person, self._folder(person))
-        return swept
-
-    def people(self) -> tuple[PersonId, ...]:
-        """As `Memory.people`; profiles that cannot be opened are logged and left out."""
-        found: list[PersonId] = []
-        for folder in sorted(one for one in self._root.glob("*") if one.is_dir()):
-            try:
-                with self._errors(folder.name), self._locked():
-                    current = _current(folder)
-                    if current is not None:
-                        with self._opened(current, "") as store:
-                            found.append(store.person)
-            except ProfileError as error:
-                _log.warning("profile left out: %s", error)
-        return tuple(sorted(found))
-
-    def _folder(self, person: PersonId) -> Path:
-        return self._root / self._names.alias(person)
-
-    def _locked(self) -> Any:
-        return locked(self._root / "lock", alone=True)
-
-    def _add(self, folder: Path, trip: Trip, feedback: Feedback | None, when: str) -> bool:
-        """Keep a trip, unless there are others first to be left behind."""
-        keep_from = self._privacy.keep_from(self._clock())
-        with self._store(folder, trip.instruction.person) as store:
-            if keep_from and store.any_before(keep_from):
-                return False
-            store.add(trip, feedback, when)
-            return True
-
-    def _leave_older(self, person: PersonId, folder: Path) -> int:
-        """Write a profile anew without the trips that are older than the retention; how many there were."""
-        keep_from = self._privacy.keep_from(self._clock())
-        if not keep_from or _current(folder) is None:
-            return 0
-        with self._store(folder, person) as store:
-            rows = list(store.rows()) if store.any_before(keep_from) else []
-        kept = [row for row in rows if row.at >= keep_from]
-        if len(kept) < len(rows):
-            self._rewrite(folder, person, kept)
-        return len(rows) - len(kept)
-
-    def _rewrite(self, folder: Path, person: PersonId, rows: Sequence[_Row]) -> None:
-        """A new directory with these rows alone takes the place of the old one. A crash leaves the old or the new."""
-        old = _current(folder)
-        draft = folder / f"{secrets.token_hex(8)}.draft"
-        with self._opened(private_directory(draft), person) as store:
-            store.put(rows)
-        for path in draft.rglob("*"):
-            descriptor = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-        draft.rename(folder / f"{_number(old) + 1:08d}")
-        sync_directory(folder)
-        if old is not None:
-            _destroy(old)
-
-    @contextmanager
-    def _reading(self, person: PersonId) -> Generator[_Store | None]:
-        if not is_somebody(person) or not self._root.exists():
-            yield None
-            return
-        with self._errors(person), self._locked():
-            folder = self._folder(person)
-            if _current(folder) is None:
-                yield None
-                return
-            with self._store(folder, person) as store:
-                yield store
-
-    @contextmanager
-    def _store(self, folder: Path, person: str) -> Generator[_Store]:
-        """The newest directory of a profile, made if there is none; what a crash left beside it goes."""
-        current = _current(folder) or private_directory(folder) / f"{1:08d}"
-        for other in folder.iterdir():
-            if other != current:
-                _destroy(other)
-        with self._opened(private_directory(current), person) as store:
-            yield store
-
-    @contextmanager
-    def _opened(self, path: Path, person: str, *, fits: bool = True) -> Generator[_Store]:
-        new = not any(path.iterdir())
-        settings = self._chroma.config.Settings(anonymized_telemetry=False)
-        client: Any = self._chroma.PersistentClient(path=str(path), settings=settings)
-        try:
-            store = _Store(_made(client, person) if new else _found(client))
-            if fits and self._names.alias(store.person) != path.parent.name:
-                raise ValueError("it is somebody else's")
-            yield store
-        finally:
-            client.close()
-            _blank(path)
-
-    @contextmanager
-    def _errors(self, person: str) -> Generator[None]:
-        try:
-            yield
-        except (ProfileError, KeyboardInterrupt, SystemExit, GeneratorExit):
-            raise
-        except BaseException as error:  # Chroma names no family of errors, and its core panics past `Exception`
-            raise ProfileError(
-                f"The profile of {person!r} in {self._root} cannot be used: {error}.",
-                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh. "
-                "Other profiles are not affected.",
-                retryable=isinstance(error, OSError),
-            ) from error
+    def _locked(self) -> AbstractContextManager[None]:
+        return locked(self._folder / "lock", alone=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,49 +144,43 @@ class _Row:
         return {**trip, **json.loads(self.document), "feedback": self.feedback}
 
 
-class _Store:
-    """One person's collection. Rows are numbered from 0 without gaps, for nothing is deleted in place."""
+class _Profile:
+    """One person's folder. Rows are numbered from 0 without gaps, for nothing is deleted in place."""
 
-    def __init__(self, collection: Any) -> None:
-        self._collection = collection
-        self._proposed: dict[int, _Row] = {}
+    def __init__(self, chroma: Any, folder: Path, person: PersonId | None) -> None:
+        """A profile that is opened for each piece of work.
+
+        Args:
+            chroma: The library.
+            folder: Has the newest directory of the profile, and what a crash left behind; made if there is none.
+            person: Whose it has to be; None for whoever it says.
+        """
+        self._chroma, self._folder, self._person = chroma, folder, person
+        self._read: dict[int, _Row] = {}
 
     @property
     def person(self) -> PersonId:
-        return PersonId(json.loads(self._collection.metadata["person"]))
+        with self._collection() as collection:
+            return _person_of(collection)
 
-    def rows(self) -> Iterator[_Row]:
-        """Every trip, oldest first."""
-        found: dict[int, _Row] = {}
-        for start in range(0, self._collection.count(), _BATCH):
-            found |= _rows(self._collection.get(limit=_BATCH, offset=start, include=_PARTS))
-        return iter([found[number] for number in sorted(found)])
+    @contextmanager
+    def reading(self, wish: Mark | None = None) -> Generator[Columns]:
+        """The trips that may bear on a wish: the nearest of all, and of those with feedback; or every trip."""
+        with self._collection() as collection:
+            self._read = dict(enumerate(_all(collection))) if wish is None else _proposed(collection, wish)
+        columns = Columns()
+        columns.extend([self._read[number].entry(number) for number in sorted(self._read)])
+        yield columns
 
-    def proposed(self, wish: Mark) -> list[Entry]:
-        """The trips that may bear on a wish, oldest first: the nearest of all, and of those with feedback."""
-        count = self._collection.count()
-        if not count:
-            return []
-        near: dict[str, Any] = {"query_embeddings": [_embedding(wish)], "include": _PARTS}
-        for asked in (
-            {"n_results": min(count, _PROPOSED)},
-            {"n_results": min(count, _PROPOSED // 2), "where": {"judged": True}},
-        ):
-            found = self._collection.query(**near, **asked)
-            self._proposed |= _rows({part: found[part][0] for part in ("ids", *_PARTS)})
-        return [self._proposed[number].entry(number) for number in sorted(self._proposed)]
+    def items(self, found: Sequence[tuple[int, float]]) -> tuple[HistoryItem, ...]:
+        return tuple(self._read[row].item(similarity) for row, similarity in found)
 
-    def item(self, number: int, similarity: float) -> HistoryItem:
-        """One of the proposed trips."""
-        return self._proposed[number].item(similarity)
+    def export(self) -> list[dict[str, Any]]:
+        with self._collection() as collection:
+            return [row.exported() for row in _all(collection)]
 
-    def any_before(self, stamp: str) -> bool:
-        """Whether there are older trips than that."""
-        when = datetime.fromisoformat(stamp).timestamp()
-        return bool(self._collection.get(where={"when_s": {"$lt": when}}, limit=1, include=[])["ids"])
-
-    def add(self, trip: Trip, feedback: Feedback | None, when: str) -> None:
-        """Keep a trip."""
+    def add(self, trip: Trip, feedback: Feedback | None, when: str, keep_from: str) -> None:
+        self.forget_before(keep_from)
         wish, situation = mark(trip.instruction.text), trip.context.situation
         facts = {
             "trip": json.dumps(trip.id[:MAX_CHARS]),
@@ -394,34 +193,119 @@ class _Store:
             "judged": feedback is not None,
             "feedback": json.dumps([] if feedback is None else [_said(feedback, when)]),
         }
-        self.put([_Row(_embedding(wish), body_of(trip), facts)])
-
-    def put(self, rows: Sequence[_Row]) -> None:
-        """Keep trips as they are."""
-        first = self._collection.count()
-        for start in range(0, len(rows), _BATCH):
-            some = rows[start : start + _BATCH]
-            self._collection.add(
-                ids=[str(first + start + at) for at in range(len(some))],
-                embeddings=[row.embedding for row in some],
-                documents=[row.document for row in some],
-                metadatas=[row.facts for row in some],
-            )
+        with self._collection() as collection:
+            _put(collection, [_Row(_embedding(wish), body_of(trip), facts)])
 
     def add_feedback(self, feedback: Feedback, when: str, trip_id: str | None) -> bool:
-        """Add feedback to the last trip, or to the last one with this id; False where there is none."""
-        if trip_id is None:
-            numbers = [self._collection.count() - 1]
-        else:
-            named = {"trip": json.dumps(trip_id[:MAX_CHARS])}
-            numbers = [int(one) for one in self._collection.get(where=named, include=[])["ids"]]
-        last = max(numbers, default=-1)
-        if last < 0:
-            return False
-        facts = self._collection.get(ids=[str(last)], include=["metadatas"])["metadatas"][0]
-        said = json.dumps([*json.loads(facts["feedback"]), _said(feedback, when)])
-        self._collection.update(ids=[str(last)], metadatas=[{**facts, "judged": True, "feedback": said}])
-        return True
+        with self._collection() as collection:
+            named = None if trip_id is None else {"trip": json.dumps(trip_id[:MAX_CHARS])}
+            last = max((int(one) for one in collection.get(where=named, include=[])["ids"]), default=-1)
+            if last < 0:
+                return False
+            facts = collection.get(ids=[str(last)], include=["metadatas"])["metadatas"][0]
+            said = json.dumps([*json.loads(facts["feedback"]), _said(feedback, when)])
+            collection.update(ids=[str(last)], metadatas=[{**facts, "judged": True, "feedback": said}])
+            return True
+
+    def forget_last(self) -> HistoryItem | None:
+        with self._collection() as collection:
+            rows = list(_all(collection))
+        if not rows:
+            return None
+        self._rewrite(rows[:-1])
+        return rows[-1].item()
+
+    def forget_before(self, when: str) -> int:
+        if not when or _current(self._folder) is None:
+            return 0
+        older = {"when_s": {"$lt": datetime.fromisoformat(when).timestamp()}}
+        with self._collection() as collection:
+            rows = list(_all(collection)) if collection.get(where=older, limit=1, include=[])["ids"] else []
+        kept = [row for row in rows if row.at >= when]
+        if len(kept) < len(rows):
+            self._rewrite(kept)
+        return len(rows) - len(kept)
+
+    def _rewrite(self, rows: Sequence[_Row]) -> None:
+        """Put a new directory with these rows alone in the place of the old one. A crash leaves the old or the new."""
+        old = _current(self._folder)
+        draft = self._folder / f"{secrets.token_hex(8)}.draft"
+        with self._opened(private_directory(draft)) as collection:
+            _put(collection, rows)
+        for path in draft.rglob("*"):
+            sync_directory(path)
+        draft.rename(self._folder / f"{(0 if old is None else int(old.name)) + 1:08d}")
+        sync_directory(self._folder)
+        if old is not None:
+            _destroy(old)
+
+    @contextmanager
+    def _collection(self) -> Generator[Any]:
+        """The newest collection, made if there is none; what a crash left beside it goes."""
+        current = _current(self._folder) or private_directory(self._folder) / f"{1:08d}"
+        for other in self._folder.iterdir():
+            if other != current:
+                _destroy(other)
+        with self._opened(private_directory(current)) as collection:
+            yield collection
+
+    @contextmanager
+    def _opened(self, path: Path) -> Generator[Any]:
+        new = not any(path.iterdir())
+        settings = self._chroma.config.Settings(anonymized_telemetry=False)
+        try:
+            client: Any = self._chroma.PersistentClient(path=str(path), settings=settings)
+        except BaseException:
+            # Chroma keeps a system that did not start, and would hand it to whoever opens this path next.
+            self._chroma.api.client.SharedSystemClient.clear_system_cache()
+            raise
+        try:
+            if new and self._person is None:
+                raise ValueError("it is empty")
+            collection = _made(client, self._person) if new else _found(client)
+            person = _person_of(collection)
+            if self._person is not None and same_name(person) != same_name(self._person):
+                raise ValueError("it is somebody else's")
+            yield collection
+        finally:
+            client.close()
+            _blank(path)
+
+
+def _person_of(collection: Any) -> PersonId:
+    return PersonId(json.loads(collection.metadata["person"]))
+
+
+def _all(collection: Any) -> Iterator[_Row]:
+    """Every trip, oldest first."""
+    found: dict[int, _Row] = {}
+    for start in range(0, collection.count(), _BATCH):
+        found |= _rows(collection.get(limit=_BATCH, offset=start, include=_PARTS))
+    return iter([found[number] for number in sorted(found)])
+
+
+def _proposed(collection: Any, wish: Mark) -> dict[int, _Row]:
+    """The nearest trips of all, and of those with feedback, by number."""
+    count = collection.count()
+    found: dict[int, _Row] = {}
+    for asked in ({"n_results": _PROPOSED}, {"n_results": _PROPOSED // 2, "where": {"judged": True}}) if count else ():
+        asked["n_results"] = min(count, asked["n_results"])
+        near = collection.query(query_embeddings=[_embedding(wish)], include=_PARTS, **asked)
+        found |= _rows({part: near[part][0] for part in ("ids", *_PARTS)})
+    return found
+
+
+def _put(collection: Any, rows: Sequence[_Row]) -> None:
+    """Add trips behind those that are there."""
+    first = collection.count()
+    for start in range(0, len(rows), _BATCH):
+        some = rows[start : start + _BATCH]
+        collection.add(
+            ids=[str(first + start + at) for at in range(len(some))],
+            embeddings=[row.embedding for row in some],
+            documents=[row.document for row in some],
+            metadatas=[row.facts for row in some],
+        )
 
 
 _PARTS: Final = ["embeddings", "documents", "metadatas"]
@@ -432,7 +316,7 @@ def _rows(found: Any) -> dict[int, _Row]:
     return {int(number): _Row(list(embedding), document, dict(facts)) for number, embedding, document, facts in parts}
 
 
-def _made(client: Any, person: str) -> Any:
+def _made(client: Any, person: PersonId | None) -> Any:
     about = {"format": FORMAT, "person": json.dumps(person)}
     space = {"hnsw": {"space": "cosine"}}
     return client.create_collection(_COLLECTION, embedding_function=None, metadata=about, configuration=space)
@@ -461,10 +345,6 @@ def _said(feedback: Feedback, when: str) -> dict[str, Any]:
 def _current(folder: Path) -> Path | None:
     """The newest complete directory of a profile."""
     return max((one for one in folder.glob("*") if one.name.isdecimal()), default=None)
-
-
-def _number(current: Path | None) -> int:
-    return 0 if current is None else int(current.name)
 
 
 def _blank(path: Path) -> None:

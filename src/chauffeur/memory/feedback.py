@@ -13,8 +13,7 @@ from typing import Literal
 
 from chauffeur.concept import Feedback
 from chauffeur.language import measured
-from chauffeur.memory.phrasebook import Topic
-from chauffeur.memory.phrases import Want, read_wants, speaks_of_the_drive
+from chauffeur.memory.phrases import Topic, Want, read_wants, speaks_of_the_drive
 from chauffeur.memory.plain_text import even
 from chauffeur.memory.remarks import Sorted, sort_remark
 

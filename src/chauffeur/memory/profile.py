@@ -17,7 +17,7 @@ from chauffeur.language.weather import weather_of
 from chauffeur.memory import cipher
 from chauffeur.memory.columns import Columns, Entry, Signs, packed
 from chauffeur.memory.records import body_of, feedback_body, item_of
-from chauffeur.memory.similarity import DIMENSIONS, ENCODER, mark
+from chauffeur.memory.similarity import DIMENSIONS, ENCODER, Mark, mark
 
 VERSION = "chauffeur-profile-1"
 
@@ -113,8 +113,8 @@ class Profile:
         return f"{self._about['token']}.{writes}"
 
     @contextmanager
-    def reading(self) -> Generator[Columns]:
-        """The columns as they are on disk; until the end, what else is read is of the same edition."""
+    def reading(self, wish: Mark | None = None) -> Generator[Columns]:  # noqa: ARG002 - all bear on any wish
+        """The columns of all trips as they are on disk; until the end, what else is read is of the same edition."""
         self._connection.execute("BEGIN")
         yield self._columns()
         self._connection.execute("COMMIT")

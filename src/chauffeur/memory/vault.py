@@ -2,40 +2,25 @@
 
 from __future__ import annotations
 
-import json
-import logging
 import os
 import threading
 import time
 import weakref
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import Final
 
-from chauffeur.concept import (
-    Context,
-    Feedback,
-    History,
-    HistoryItem,
-    Instruction,
-    PersonId,
-    ProfileError,
-    Trip,
-)
+from chauffeur.concept import PersonId, ProfileError
 from chauffeur.concept.data import data_home
-from chauffeur.language.weather import weather_of
 from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.files import locked, private_directory, sync_directory
-from chauffeur.memory.keys import KeyRing, same_name
-from chauffeur.memory.privacy import Privacy, is_somebody, read_privacy, stamp, utc_now
+from chauffeur.memory.keys import KeyRing
+from chauffeur.memory.privacy import Privacy, read_privacy, utc_now
 from chauffeur.memory.profile import VERSION, Index, Profile, create_profile
-from chauffeur.memory.retrieval import UNCOMPARED, latest, nearest
-from chauffeur.memory.similarity import mark
-
-_log = logging.getLogger(__name__)
+from chauffeur.memory.profile_memory import ProfileMemory
 
 _OPEN_PEOPLE: Final = 8
 """So many profiles stay open, those used last."""
@@ -67,17 +52,16 @@ class _Opened:
         self.profile.close()
 
 
-class VaultMemory:
+class VaultMemory(ProfileMemory):
     """Memory in encrypted files on this machine; safe for several processes and threads at once.
 
     Files stay open from one piece of work to the next, and each piece of work begins with a look at them: another
     process may write to a profile, replace it or erase it at any time.
-
-    Attributes:
-        encrypts: What is kept cannot be read without its key.
     """
 
-    encrypts: ClassVar = True
+    encrypts = True
+    _format = VERSION
+    _failures = (DatabaseError, OSError)
 
     def __init__(
         self,
@@ -98,16 +82,12 @@ class VaultMemory:
             clock: Present time, with a time zone.
         """
         root = data_home() if home is None else home
-        self._profiles = root / "profiles"
-        self._lock = self._profiles / "lock"
+        profiles = root / "profiles"
+        self._lock = profiles / "lock"
         self._keys = root / "keys" if keys is None else keys
-        self._ring = KeyRing(
-            self._keys,
-            os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase,
-            in_use=lambda: any(self._profiles.glob("*.db")),
-        )
-        self._privacy = read_privacy(root) if privacy is None else privacy
-        self._clock = clock
+        passphrase = os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase
+        ring = KeyRing(self._keys, passphrase, in_use=lambda: any(profiles.glob("*.db")))
+        super().__init__(profiles, ring, read_privacy(root) if privacy is None else privacy, clock)
         self._guard = threading.RLock()
         self._opened: dict[str, _Opened] = {}
         self._process = os.getpid()
@@ -118,132 +98,37 @@ class VaultMemory:
         with self._guard:
             _close_all(self._opened, self._process)
 
-    def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
-        """As `Memory.recall`; similarity is set on every item."""
-        now = self._clock()
-        with self._reading(person) as profile:
-            if profile is None:
-                return History()
-            wish, place, since = mark(instruction.text), context.situation, self._privacy.since(now)
-            with profile.reading() as columns:
-                return History(
-                    profile.items(nearest(columns, wish, place.world, weather_of(place), now, k, since=since))
-                )
+    def _aliases(self) -> list[str]:
+        return sorted({path.stem for path in (*self._folder.glob("*.db"), *self._keys.glob("*.key"))})
 
-    def latest(self, person: PersonId, world: str, k: int) -> History:
-        """As `Memory.latest`."""
-        with self._reading(person) as profile:
-            if profile is None:
-                return History()
-            with profile.reading() as columns:
-                rows = latest(columns, world, k, since=self._privacy.since(self._clock()))
-                return History(profile.items([(row, UNCOMPARED) for row in rows]))
-
-    def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
-        """As `Memory.remember`."""
-        person = trip.instruction.person
-        if not is_somebody(person) or not self._privacy.keeps:
-            return
-        when, keep_from = stamp(self._clock()), self._privacy.keep_from(self._clock())
-        with self._guard:
-            while True:
-                self._ensure(person)
-                with self._reading(person) as profile:
-                    if profile is not None:  # else another process erased it just now
-                        profile.add(trip, feedback, when, keep_from)
-                        return
-
-    def attach_feedback(self, person: PersonId, feedback: Feedback, trip_id: str | None = None) -> bool:
-        """As `Memory.attach_feedback`."""
-        with self._reading(person) as profile:
-            return profile is not None and profile.add_feedback(feedback, stamp(self._clock()), trip_id)
-
-    def export(self, person: PersonId) -> str:
-        """As `Memory.export`; every trip and every feedback carries its time."""
-        with self._reading(person) as profile:
-            trips = [] if profile is None else profile.export()
-        document = {"format": VERSION, "person": person, "exported": stamp(self._clock()), "trips": trips}
-        return json.dumps(document, indent=2)
-
-    def forget_last(self, person: PersonId) -> HistoryItem | None:
-        """As `Memory.forget_last`."""
-        with self._reading(person) as profile:
-            return None if profile is None else profile.forget_last()
-
-    def erase(self, person: PersonId) -> bool:
-        """As `Memory.erase`, of damaged profiles too: the key goes first, so nothing can be read from then on.
-
-        Every profile that says it is this person's goes, also where its file has another name: the salt that names are
-        made with may have been lost, or replaced.
-
-        Raises:
-            ProfileError: A file cannot be erased; or the salt is lost, and the profile is none that can be opened.
-        """
-        if not is_somebody(person) or not self._profiles.exists():
-            return False
-        aliases, closed = self._aliases_of(person)
-        try:
-            aliases.add(self._ring.alias(person))
-        except ProfileError as error:
-            if not aliases and closed:
-                raise ProfileError(
-                    f"Whether anything is kept of {person!r} cannot be told: {error.message} And {len(closed)} "
-                    f"profiles cannot be opened: {', '.join(closed)}.",
-                    hint=f"Restore the salt, or the passphrase; or delete these files in {self._keys} and "
-                    f"{self._profiles}, whosever they are.",
-                ) from error
+    def _destroy(self, aliases: Iterable[str]) -> bool:
+        """The key goes first, so nothing can be read from then on."""
         existed = False
-        with self._guard, self._errors(person), locked(self._lock, alone=True):
+        with self._guard, locked(self._lock, alone=True):
             for alias in aliases:
                 self._shut(alias)
                 existed |= self._ring.destroy(alias)
-                for leftover in (*self._keys.glob(f"{alias}.*"), *self._profiles.glob(f"{alias}.*")):
+                for leftover in (*self._keys.glob(f"{alias}.*"), *self._folder.glob(f"{alias}.*")):
                     leftover.unlink(missing_ok=True)
                     existed = True
             sync_directory(self._keys)
-            sync_directory(self._profiles)
+            sync_directory(self._folder)
         return existed
 
-    def _aliases_of(self, person: PersonId) -> tuple[set[str], list[str]]:
-        """Names of the files that say they are a person's, and of those that cannot be opened and so say nothing."""
-        found: set[str] = set()
-        closed: list[str] = []
-        for alias in sorted({path.stem for path in (*self._profiles.glob("*.db"), *self._keys.glob("*.key"))}):
-            try:
-                with self._open(alias, alias) as profile:
-                    if profile is None:  # a key without a profile
-                        closed.append(alias)
-                    elif same_name(profile.person) == same_name(person):
-                        found.add(alias)
-            except ProfileError:
-                closed.append(alias)
-        return found, closed
-
-    def sweep(self) -> int:
-        """Delete every trip that is older than the retention, of everybody; how many there were."""
-        keep_from = self._privacy.keep_from(self._clock())
-        swept = 0
-        for person in self.people() if keep_from else ():
-            with self._reading(person) as profile:
-                swept += 0 if profile is None else profile.forget_before(keep_from)
-        return swept
-
-    def people(self) -> tuple[PersonId, ...]:
-        """As `Memory.people`; profiles that cannot be opened are logged and left out."""
-        found: list[PersonId] = []
-        for path in sorted(self._profiles.glob("*.db")):
-            try:
-                with self._open(path.stem, path.stem) as profile:
-                    if profile is not None:
-                        found.append(profile.person)
-            except ProfileError as error:
-                _log.warning("profile left out: %s", error)
-        return tuple(sorted(found))
+    @contextmanager
+    def _made(self, person: PersonId) -> Generator[Profile]:
+        with self._guard:
+            while True:
+                self._ensure(person)
+                with self._open(self._ring.alias(person), person) as profile:
+                    if profile is not None:  # else another process erased it just now
+                        yield profile
+                        return
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""
         with self._errors(person):
-            private_directory(self._profiles)
+            private_directory(self._folder)
             private_directory(self._keys)
             alias = self._ring.alias(person)
             path = self._path(alias)
@@ -252,35 +137,25 @@ class VaultMemory:
             with locked(self._lock, alone=True):
                 if path.exists():
                     return
-                for leftover in self._profiles.glob(f"{alias}.*"):
+                for leftover in self._folder.glob(f"{alias}.*"):
                     leftover.unlink()
                 draft = path.with_suffix(".draft")
                 create_profile(draft, self._ring.find_or_make(alias), person)
                 draft.chmod(0o600)
                 draft.rename(path)
-                sync_directory(self._profiles)
+                sync_directory(self._folder)
 
     @contextmanager
-    def _reading(self, person: PersonId) -> Generator[Profile | None]:
-        """The person's open profile, or None for nobody and for people of whom nothing is kept."""
-        with self._errors(person):
-            kept = is_somebody(person) and self._profiles.exists()
-        if not kept:
-            yield None
-            return
-        with self._open(self._ring.alias(person), person) as profile:
-            yield profile
-
-    @contextmanager
-    def _open(self, alias: str, person: str) -> Generator[Profile | None]:
-        with self._guard, self._errors(person), locked(self._lock, alone=False):
+    def _open(self, alias: str, person: PersonId | None = None) -> Generator[Profile | None]:
+        name = alias if person is None else person
+        with self._guard, self._errors(name), locked(self._lock, alone=False):
             self._leave_what_is_gone()
             # What is open still was just now seen to be there.
             if alias not in self._opened and not self._path(alias).exists():
                 yield None
                 return
             try:
-                opened = self._current(alias, person)
+                opened = self._current(alias, name)
                 yield opened.profile
                 opened.looks = _looks(opened.path)
             except BaseException:
@@ -331,19 +206,7 @@ class VaultMemory:
             opened.close()
 
     def _path(self, alias: str) -> Path:
-        return self._profiles / f"{alias}.db"
-
-    @contextmanager
-    def _errors(self, person: str) -> Generator[None]:
-        try:
-            yield
-        except (DatabaseError, OSError) as error:
-            raise ProfileError(
-                f"The profile of {person!r} in {self._profiles} cannot be used: {error}.",
-                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh; if the "
-                "file is busy or the disk full, try again. Other profiles are not affected.",
-                retryable=isinstance(error, OSError) or any(word in str(error) for word in ("locked", "full")),
-            ) from error
+        return self._folder / f"{alias}.db"
 
 
 _inherited: list[_Opened] = []

@@ -4,17 +4,14 @@ from chauffeur.describe.services.osm_file import load_road_map
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.road_map import RoadMap
 from chauffeur.describe.services.rules import load_rules, packaged_regions
-from chauffeur.describe.services.settings import ServiceSettings
-from chauffeur.describe.services.sources import Sources, read_sources
+from chauffeur.describe.services.sources import Sources, SourceSettings, read_sources
 from chauffeur.describe.services.surroundings import Surroundings
-from chauffeur.describe.services.survey import ContextServices
 
 __all__ = [
-    "ContextServices",
     "Position",
     "RoadMap",
     "ServiceReading",
-    "ServiceSettings",
+    "SourceSettings",
     "Sources",
     "Surroundings",
     "Unknown",

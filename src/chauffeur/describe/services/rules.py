@@ -5,15 +5,15 @@ A rule file is TOML. Speeds in it are in the unit of the region's signs. Every g
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from chauffeur.concept import ConfigError
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH
+from chauffeur.describe.services.toml_file import read_file, read_text
 from chauffeur.safety.screening import screen
 
 RoadClass = Literal[
@@ -21,8 +21,6 @@ RoadClass = Literal[
     "tertiary", "tertiary_link", "unclassified", "residential", "living_street", "service", "track", "busway", "road",
 ]  # fmt: skip
 """Values of OSM's `highway` tag that a car can drive on."""
-
-_MAX_BYTES: Final = 64_000
 
 
 def _plain(text: str) -> str:
@@ -146,7 +144,7 @@ def load_rules(region: str) -> Rules:
         ConfigError: No such region or file, or the file says something that is not understood.
     """
     if region.endswith(".toml"):
-        return _from_file(Path(region))
+        return read_file(Rules, Path(region))
     name = region.strip().lower()
     if name not in packaged_regions():
         raise ConfigError(
@@ -157,43 +155,6 @@ def load_rules(region: str) -> Rules:
     return read_rules(text, name)
 
 
-def _from_file(path: Path) -> Rules:
-    try:
-        with path.open("rb") as file:
-            body = file.read(_MAX_BYTES + 1)
-        text = body.decode("utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be read ({error.strerror}).", hint="Check the path.") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path} is not UTF-8 text.", hint="Save it as UTF-8.") from error
-    if len(body) > _MAX_BYTES:
-        raise ConfigError(f"{path} is longer than {_MAX_BYTES} bytes.", hint="A rule file has about 60 lines.")
-    return read_rules(text, str(path))
-
-
 def read_rules(text: str, where: str) -> Rules:
-    """Rules from the text of a rule file.
-
-    Raises:
-        ConfigError: It is not TOML, or a key is unknown, missing or out of range.
-    """
-    try:
-        return Rules.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{where} is not TOML: {error}.", hint="Look at that line.") from error
-    except ValidationError as error:
-        # A key that is not known comes first: it often is why another one is missing.
-        wrong = sorted(
-            error.errors(include_url=False, include_input=False), key=lambda one: one["type"] != "extra_forbidden"
-        )
-        first = wrong[0]
-        key = ".".join(str(step) for step in first["loc"] if step != "[key]") or "the file"
-        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-        if first["type"] == "extra_forbidden":
-            raise ConfigError(
-                f"{where}: the key {key!r} is not known{more}.",
-                hint="Take it out, or correct it; `docs/services.md` lists the keys.",
-            ) from error
-        if first["type"] == "missing":
-            raise ConfigError(f"{where}: {key!r} is missing{more}.", hint="Add it, with its source.") from error
-        raise ConfigError(f"{where}: {key!r}: {first['msg']}{more}.", hint="Correct that key.") from error
+    """Rules from the text of a rule file. Raises ConfigError: It is not TOML, or not rules."""
+    return read_text(Rules, text, where)

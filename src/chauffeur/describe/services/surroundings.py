@@ -209,12 +209,14 @@ def _rows(name: str, known: ServiceReading[T] | Unknown, cells: Callable[[T], Ce
         yield Row(name, None, "", "", None, 0.0, known.reason)
         return
     for inner, value, unit in cells(known.value):
+        if value is None and inner:  # a detail that was not told
+            continue
         full = f"{name}.{inner}" if inner else name
         yield Row(full, value, unit, known.source, known.age_s, known.confidence, known.note)
 
 
 def _weather_cells(weather: Weather) -> Cells:
-    cells: Cells = (
+    return (
         ("conditions", ", ".join(weather.conditions) or None, ""),
         ("temperature", weather.temperature_c, "°C"),
         ("visibility", weather.visibility_m, "m"),
@@ -223,23 +225,19 @@ def _weather_cells(weather: Weather) -> Cells:
         ("wind", weather.wind_mps, "m/s"),
         ("gusts", weather.gust_mps, "m/s"),
     )
-    return tuple(cell for cell in cells if cell[1] is not None)
 
 
 def _road_cells(road: ServiceRoad) -> Cells:
-    oneway = "one way" if road.oneway else "both ways"
-    cells: Cells = (
+    return (
         ("class", road.road_class, ""),
         ("name", road.name or None, ""),
         ("lanes", None if road.lanes is None else float(road.lanes), "lanes"),
-        ("direction", oneway, ""),
+        ("direction", "one way" if road.oneway else "both ways", ""),
     )
-    return tuple(cell for cell in cells if cell[1] is not None)
 
 
 def _limit_cells(limit: Limit) -> Cells:
-    detail: Cells = (("detail", limit.detail, ""),) if limit.detail else ()
-    return (("", limit.speed_mps, "m/s"), ("origin", limit.origin, ""), *detail)
+    return (("", limit.speed_mps, "m/s"), ("origin", limit.origin, ""), ("detail", limit.detail or None, ""))
 
 
 def _traffic_cells(traffic: TrafficReport) -> Cells:

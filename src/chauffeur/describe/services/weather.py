@@ -15,6 +15,8 @@ from chauffeur.describe.services.http_source import Service, Told
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position, distance_m
 
+_DECIMALS: Final = 3
+"""Of the position that the service is told: about 100 m."""
 _CELL_DEG: Final = 0.01
 """About 1 km: one answer for all of it."""
 _FAR_M: Final = 15_000.0
@@ -122,28 +124,28 @@ def _night_icon(listed: list[Any]) -> bool | None:
     return {"n": True, "d": False}.get(icon[-1:]) if isinstance(icon, str) else None
 
 
-def open_weather(decimals: int) -> Service[Weather]:
-    """A server that speaks OpenWeather 2.5, told the position with so many decimals."""
+def _query(here: Position) -> dict[str, str]:
+    latitude, longitude = here.rounded(_DECIMALS)
+    return {"lat": f"{latitude:.{_DECIMALS}f}", "lon": f"{longitude:.{_DECIMALS}f}", "units": "metric"}
 
-    def query(here: Position) -> dict[str, str]:
-        latitude, longitude = here.rounded(decimals)
-        return {"lat": f"{latitude:.{decimals}f}", "lon": f"{longitude:.{decimals}f}", "units": "metric"}
 
-    def cell(here: Position) -> Hashable:
-        return round(here.latitude_deg / _CELL_DEG), round(here.longitude_deg / _CELL_DEG)
+def _cell(here: Position) -> Hashable:
+    return round(here.latitude_deg / _CELL_DEG), round(here.longitude_deg / _CELL_DEG)
 
-    return Service(
-        name="OpenWeather",
-        path="/data/2.5/weather",
-        query=query,
-        read=lambda body, _: read_weather(body),
-        cell=cell,
-        near=lambda _, asked, here: cell(asked) == cell(here),
-        serves=lambda _, asked, here: distance_m(asked, here) <= _FAR_M,
-        max_bytes=64_000,
-        fresh_s=600.0,
-        usable_s=3_600.0,
-        oldest_s=2.0 * 3_600.0,
-        keeps=64,
-        key=("appid", "OPENWEATHER_API_KEY"),
-    )
+
+OPEN_WEATHER: Final = Service(
+    name="OpenWeather",
+    path="/data/2.5/weather",
+    query=_query,
+    read=lambda body, _: read_weather(body),
+    cell=_cell,
+    near=lambda _, asked, here: _cell(asked) == _cell(here),
+    serves=lambda _, asked, here: distance_m(asked, here) <= _FAR_M,
+    max_bytes=64_000,
+    fresh_s=600.0,
+    usable_s=3_600.0,
+    oldest_s=2.0 * 3_600.0,
+    keeps=64,
+    key=("appid", "OPENWEATHER_API_KEY"),
+)
+"""A server that speaks OpenWeather 2.5."""
