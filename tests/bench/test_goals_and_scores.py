@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, _Held, make_goal
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, make_goal
 from chauffeur.bench.lampilot.metrics import PAPER, RULERS, metrics_of, points
 from chauffeur.concept import ConfigError, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
@@ -24,26 +24,22 @@ def _with_goal(name: str, **goal: object) -> Scenario:
     return Scenario(scenario.id, scenario.world, scenario.config, scenario.seed, goal=dict(goal))
 
 
-def test_a_condition_must_be_held_for_longer_than_five_seconds() -> None:
-    held = _Held()
-    rulings = [held.judge(t / 10, reached=True, lost=False) for t in range(1, 60)]
+def test_a_speed_must_be_held_for_longer_than_five_seconds_within_a_minute() -> None:
+    road = _world("cruise").perception()
+    now = road.instant()
+    there, elsewhere = now._replace(speed_mps=20.0), now._replace(speed_mps=25.0)
+
+    def ruled(*instants: tuple[float, bool]) -> list[str]:
+        goal = make_goal(road, _with_goal("cruise", type="ACCEvalbySpeed", speed=20))
+        return [goal.rule(t, there if reached else elsewhere) for t, reached in instants]
+
+    rulings = ruled(*((t / 10, True) for t in range(1, 60)))
     # Reached at 0.1 s; the first instant more than 5 s later is 5.2 s (float time, as in the origin).
     assert rulings.index("success") in (50, 51)
     assert (rulings.index("success") + 1) / 10 > 0.1 + HOLD_S
-
-
-def test_losing_the_condition_restarts_the_clock() -> None:
-    held = _Held()
-    for t in range(1, 40):
-        assert held.judge(t / 10, reached=True, lost=False) == "open"
-    assert held.judge(4.0, reached=False, lost=True) == "open"
-    assert held.judge(4.1, reached=True, lost=False) == "open"
-    assert held.judge(9.0, reached=True, lost=False) == "open"
-    assert held.judge(9.3, reached=True, lost=False) == "success"
-
-
-def test_time_runs_out() -> None:
-    assert _Held().judge(GIVE_UP_S + 0.1, reached=False, lost=False) == "failure"
+    lost = ruled((0.1, True), (4.0, False), (4.1, True), (9.0, True), (9.3, True))
+    assert lost == ["open"] * 4 + ["success"]
+    assert ruled((GIVE_UP_S + 0.1, False)) == ["failure"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.lampilot.goals_more import CHANGE_HOLD_S, answered_rightly, make_any_goal
+from chauffeur.bench.lampilot.goals import CHANGE_HOLD_S, answered_rightly, make_goal
 from chauffeur.bench.lampilot.report import answers_note
 from chauffeur.bench.lampilot.scenes import Annotation, annotated, load_annotations
 from chauffeur.bench.lampilot.scenes.feasible import feasible, impossible, start_of
@@ -61,7 +61,7 @@ def _lane(world: HighwayWorld, offset: int) -> Any:
 
 def test_steps_must_come_in_order_and_each_begins_where_the_last_ended() -> None:
     world = _world("left-lane")
-    goal = make_any_goal(world.perception(), _scenario("left-lane", {"type": "SequenceEval", "steps": [RIGHT, LEFT]}))
+    goal = make_goal(world.perception(), _scenario("left-lane", {"type": "SequenceEval", "steps": [RIGHT, LEFT]}))
     initial = world.driver().initial_setpoints()
     ruling, ticks = _until(goal, _drive(world, replace(initial, target_lane=_lane(world, 1)), 4.0))
     assert ruling == "open"  # the first step alone
@@ -72,7 +72,7 @@ def test_steps_must_come_in_order_and_each_begins_where_the_last_ended() -> None
 def test_the_second_step_alone_is_nothing() -> None:
     world = _world("overtake")
     steps = [{"type": "ReachEval", "speed": 5}, LEFT]
-    goal = make_any_goal(world.perception(), _scenario("overtake", {"type": "SequenceEval", "steps": steps}))
+    goal = make_goal(world.perception(), _scenario("overtake", {"type": "SequenceEval", "steps": steps}))
     initial = world.driver().initial_setpoints()
     assert _until(goal, _drive(world, replace(initial, target_lane=_lane(world, -1)), 6.0))[0] == "open"
 
@@ -80,7 +80,7 @@ def test_the_second_step_alone_is_nothing() -> None:
 def test_a_step_that_takes_a_minute_has_failed() -> None:
     world = _world("overtake")
     steps = [{"type": "ReachEval", "speed": 5}, LEFT]
-    goal = make_any_goal(world.perception(), _scenario("overtake", {"type": "SequenceEval", "steps": steps}))
+    goal = make_goal(world.perception(), _scenario("overtake", {"type": "SequenceEval", "steps": steps}))
     now = world.perception().instant()
     assert goal.rule(59.9, now) == "open"
     assert goal.rule(60.1, now) == "failure"
@@ -88,9 +88,7 @@ def test_a_step_that_takes_a_minute_has_failed() -> None:
 
 def test_a_change_counts_once_it_has_lasted() -> None:
     world = _world("cruise")
-    goal = make_any_goal(
-        world.perception(), _scenario("cruise", {"type": "ChangeEval", "quantity": "speed", "change": -1})
-    )
+    goal = make_goal(world.perception(), _scenario("cruise", {"type": "ChangeEval", "quantity": "speed", "change": -1}))
     start = world.perception().instant()
     slow, fast = start._replace(speed_mps=start.speed_mps - 1.1), start._replace(speed_mps=start.speed_mps + 5)
     assert goal.rule(0.1, fast) == "open"
@@ -104,18 +102,18 @@ def test_a_change_counts_once_it_has_lasted() -> None:
 def test_a_wider_gap_is_wider_than_at_the_start() -> None:
     world = _world("following")
     spec = {"type": "ChangeEval", "quantity": "distance", "change": 1}
-    goal = make_any_goal(world.perception(), _scenario("following", spec))
+    goal = make_goal(world.perception(), _scenario("following", spec))
     initial = world.driver().initial_setpoints()
     slower = replace(initial, target_speed_mps=10.0)
     assert _until(goal, _drive(world, slower, 20.0))[0] == "success"
     world = _world("following")
-    goal = make_any_goal(world.perception(), _scenario("following", spec | {"change": -1}))
+    goal = make_goal(world.perception(), _scenario("following", spec | {"change": -1}))
     assert _until(goal, _drive(world, slower, 20.0))[0] == "open"
 
 
 def test_a_refusal_driven_is_a_failure_at_once() -> None:
     world = _world("cruise")
-    goal = make_any_goal(world.perception(), _scenario("cruise", {"type": "RefuseEval"}))
+    goal = make_goal(world.perception(), _scenario("cruise", {"type": "RefuseEval"}))
     assert goal.rule(0.1, world.perception().instant()) == "failure"
 
 
@@ -133,7 +131,7 @@ def test_a_refusal_driven_is_a_failure_at_once() -> None:
 )
 def test_bad_goals_are_named(goal: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        make_any_goal(_world("overtake").perception(), _scenario("overtake", goal))
+        make_goal(_world("overtake").perception(), _scenario("overtake", goal))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +139,7 @@ def test_bad_goals_are_named(goal: dict[str, Any], message: str) -> None:
 )
 def test_gap_goals_need_somebody_ahead(goal: dict[str, Any]) -> None:
     with pytest.raises(ScenarioError, match="none within 100 m"):
-        make_any_goal(_world("cruise").perception(), _scenario("cruise", {"change": 1} | goal))
+        make_goal(_world("cruise").perception(), _scenario("cruise", {"change": 1} | goal))
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
 from chauffeur.bench.lampilot.scenes.kinds import (
@@ -194,7 +194,7 @@ def test_annotations_agree_with_scenes(suite: tuple[Path, Any]) -> None:
             note = notes[item.id]
             world = HighwayWorld()
             world.reset(item.scenario)
-            make_any_goal(world.perception(), item.scenario)  # can be judged
+            make_goal(world.perception(), item.scenario)  # can be judged
             assert note.split == name.split("/")[0]
             assert (note.right == "drive") == (note.expert_s > 0)
             assert (note.phrasing == "") == (note.split == "extras")

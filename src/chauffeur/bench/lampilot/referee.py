@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from chauffeur.bench.lampilot.goals import Goal, Ruling
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import Goal, Ruling, make_goal
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.signals import SignalLog, Signals
 from chauffeur.concept import Metric, Outcome, Scenario
@@ -56,7 +55,7 @@ class LampilotReferee(GoalJudge):
 
     def __init__(self, world: HasRoad, scenario: Scenario) -> None:
         road = world.perception()
-        super().__init__(road, make_any_goal(road, scenario))
+        super().__init__(road, make_goal(road, scenario))
         self._log = SignalLog(road)
 
     def observe(self) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, make_goal
 from chauffeur.bench.lampilot.referee import GoalJudge
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
 from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
@@ -89,7 +88,7 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
     if isinstance(start, str):
         return FeasibilityVerdict(False, start)
     try:
-        goal = make_any_goal(world.perception(), scenario)
+        goal = make_goal(world.perception(), scenario)
     except ScenarioError as error:
         return FeasibilityVerdict(False, error.message)
     programs = programs_for(scenario.goal, describe(start).situation)
@@ -115,7 +114,7 @@ def _fulfilled_by_itself(world: HighwayWorld, scenario: Scenario, goal: Goal) ->
 
 
 def _drive(world: HighwayWorld, scenario: Scenario, source: str) -> tuple[bool, str, int]:
-    referee = GoalReferee(world, make_any_goal(world.perception(), scenario))
+    referee = GoalReferee(world, make_goal(world.perception(), scenario))
     episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False)
     if episode.causes.infra_failed:
         raise SandboxError(f"The sandbox failed in scene {scenario.id!r}: {episode.causes.detail}", retryable=True)
@@ -144,7 +143,7 @@ def impossible(scenario: Scenario, wish: dict[str, Any]) -> bool:
     wanted = replace(scenario, goal=wish)
     world.reset(wanted)
     try:
-        make_any_goal(world.perception(), wanted)
+        make_goal(world.perception(), wanted)
     except ScenarioError:
         return True
     return False

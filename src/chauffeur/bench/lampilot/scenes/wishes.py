@@ -65,7 +65,7 @@ class SceneWish:
 
     Attributes:
         sections: Grammar sections it may be worded with.
-        goal: Condition it is judged by (`goals` or `goals_more`).
+        goal: Condition it is judged by (`goals`).
         origin: LaMPilot's nearest condition, written into the DbLv1 file; the same as `goal` where LaMPilot has it.
         stem: Beginning of the task file's name.
         slots: Values the templates may name: a side, or a quantity.
