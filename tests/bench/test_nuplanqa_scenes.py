@@ -18,17 +18,18 @@ from chauffeur.bench.nuplanqa.scenes import making
 from chauffeur.bench.nuplanqa.scenes.facts import FAMILIES, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.gate import gate
 from chauffeur.bench.nuplanqa.scenes.making import QaConfig, make_set, make_split
-from chauffeur.bench.nuplanqa.scenes.staging import StagedScene, stage
+from chauffeur.bench.nuplanqa.scenes.scene import QaScene
+from chauffeur.bench.nuplanqa.scenes.staging import stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs, word_bank
 from chauffeur.concept import ConfigError
 from chauffeur.geometry.box import overlap
 
 
-def scenes(count: int, seed: int) -> list[StagedScene]:
+def scenes(count: int, seed: int) -> list[QaScene]:
     return [stage(f"{seed:08x}{number:08x}", np.random.default_rng([seed, number])) for number in range(count)]
 
 
-def written(staged: list[StagedScene], split: Split) -> list[VqaItem]:
+def written(staged: list[QaScene], split: Split) -> list[VqaItem]:
     writer = QuestionWriter(split)
     found: list[VqaItem] = []
     for number, scene in enumerate(staged):
@@ -38,11 +39,11 @@ def written(staged: list[StagedScene], split: Split) -> list[VqaItem]:
 
 
 @pytest.fixture(scope="module")
-def staged() -> list[StagedScene]:
+def staged() -> list[QaScene]:
     return scenes(260, 7)
 
 
-def test_nobody_overlaps_and_motion_is_continuous(staged: list[StagedScene]) -> None:
+def test_nobody_overlaps_and_motion_is_continuous(staged: list[QaScene]) -> None:
     for scene in staged[:120]:
         for instant in scene.instants:
             boxes = [instant.ego.box, *(one.box for one in instant.others)]
@@ -52,11 +53,11 @@ def test_nobody_overlaps_and_motion_is_continuous(staged: list[StagedScene]) -> 
             assert moved == pytest.approx(0.25 * (now.ego.speed_mps + before.ego.speed_mps), abs=0.05)
 
 
-def test_every_scene_is_the_same_again(staged: list[StagedScene]) -> None:
+def test_every_scene_is_the_same_again(staged: list[QaScene]) -> None:
     assert scenes(20, 7)[13].instants == staged[13].instants
 
 
-def test_classes_are_known_and_agree_with_the_observation(staged: list[StagedScene]) -> None:
+def test_classes_are_known_and_agree_with_the_observation(staged: list[QaScene]) -> None:
     for scene in staged:
         found = {fact.family: fact.value for fact in facts_of(scene, sighted(scene)) if not fact.side}
         assert all(value in word_bank().families[family].classes for family, value in found.items())
@@ -75,13 +76,13 @@ def test_classes_are_known_and_agree_with_the_observation(staged: list[StagedSce
             assert found["gap"] == ("closes" if change < -1.0 else "opens" if change > 1.0 else "same")
 
 
-def test_nothing_is_asked_about_what_nobody_can_see(staged: list[StagedScene]) -> None:
+def test_nothing_is_asked_about_what_nobody_can_see(staged: list[QaScene]) -> None:
     scene = next(one for one in staged if one.lead is not None and one.light is not None)
     blind = {fact.family for fact in facts_of(scene, frozenset())}
     assert blind.isdisjoint({"ahead", "gap", "light", "key", "manoeuvre", "situation", "action"})
 
 
-def test_the_gate_holds_where_words_signals_and_lengths_tell_nothing(staged: list[StagedScene]) -> None:
+def test_the_gate_holds_where_words_signals_and_lengths_tell_nothing(staged: list[QaScene]) -> None:
     train, test = written(staged, "train"), written(scenes(200, 8), "test")
     assert {item.subtask for item in test} == set(SUBTASKS)
     lines = gate(test, train)
@@ -90,7 +91,7 @@ def test_the_gate_holds_where_words_signals_and_lengths_tell_nothing(staged: lis
     assert max(Counter(item.answer for item in train).values()) < 0.32 * len(train)
 
 
-def test_the_baseline_finds_what_a_careless_set_gives_away(staged: list[StagedScene]) -> None:
+def test_the_baseline_finds_what_a_careless_set_gives_away(staged: list[QaScene]) -> None:
     careless = [
         replace(
             item,
@@ -107,13 +108,13 @@ def test_the_baseline_finds_what_a_careless_set_gives_away(staged: list[StagedSc
     assert not all(line.passes() for line in gate(careless))
 
 
-def test_wordings_of_the_test_split_are_heard_nowhere_else(staged: list[StagedScene]) -> None:
+def test_wordings_of_the_test_split_are_heard_nowhere_else(staged: list[QaScene]) -> None:
     train, test = written(staged, "train"), written(staged, "test")
     said = {text for item in train for text in (item.question, *item.options)}
     assert said.isdisjoint({text for item in test for text in (item.question, *item.options)})
 
 
-def test_free_pairs_are_answers_of_the_bank(staged: list[StagedScene]) -> None:
+def test_free_pairs_are_answers_of_the_bank(staged: list[QaScene]) -> None:
     scene = staged[0]
     facts = list(facts_of(scene, sighted(scene)))
     pairs = list(free_pairs(scene, facts, 20, np.random.default_rng(0)))

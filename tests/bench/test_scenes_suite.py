@@ -26,7 +26,6 @@ from chauffeur.bench.lampilot.scenes.kinds import (
     apportion,
     plan_suite,
 )
-from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.bench.lampilot.scenes.scene_check import Fault, check, counts, folders_of
 from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
 from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
@@ -129,13 +128,6 @@ def test_every_kind_can_be_made() -> None:
         row = make_item(Job(3, slot))
         assert row["wordings"], kind
         assert row["right"] == {"refuse": "refuse", "ask": "ask"}.get(kind.split("_", 1)[0], "drive")
-
-
-def test_unknown_kinds_are_no_kinds() -> None:
-    import numpy as np
-
-    with pytest.raises(KeyError):
-        draw_road("fly", np.random.default_rng(0))
 
 
 # What is written

@@ -14,7 +14,7 @@ from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, PAPER_WORDS, Slot
 from chauffeur.bench.lampilot.scenes.unambiguous import fault_of, fault_of_goal, words_of
 from chauffeur.bench.lampilot.scenes.wish_sampler import EXITS
 from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
-from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, in_words, say, sections, spoken, templates, word
+from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, grammar, in_words, spoken, word
 from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, form_of, normal
 from chauffeur.concept import InstructionError
 from chauffeur.language import read_quantities
@@ -66,21 +66,21 @@ def test_every_template_says_its_wish_now_and_then(kind: str) -> None:
     wish, rng = WISHES[kind], np.random.default_rng(1)
     slots = dict(wish.slots)
     never: list[str] = []
-    for template in templates(wish.sections[0]):
+    for template in grammar().templates(wish.sections[0]):
         for _ in range(60):
             said = {name: v if isinstance(v, str) else spoken(v, rng) for name, v in slots.items()}
-            if not fault_of(say(template, said, rng).text, wish):
+            if not fault_of(grammar().say(template, said, rng).text, wish):
                 break
         else:
             never.append(template.id)
-    assert len(never) <= len(templates(wish.sections[0])) // 8, never
+    assert len(never) <= len(grammar().templates(wish.sections[0])) // 8, never
 
 
 @pytest.mark.parametrize("kind", WISHES)
 def test_the_test_split_has_phrasings_of_its_own(kind: str) -> None:
     section = WISHES[kind].sections[0]
-    assert len(templates(section, held=True)) >= 7
-    assert len(templates(section, held=False)) >= 15
+    assert len(grammar().templates(section, held=True)) >= 7
+    assert len(grammar().templates(section, held=False)) >= 15
     seen = word(WISHES[kind], KINDS[kind], Slot(0, kind, "train"), np.random.default_rng(2))
     unseen = word(WISHES[kind], KINDS[kind], Slot(0, kind, "test", held=True), np.random.default_rng(2))
     assert not {w.template for w in seen.wordings} & {w.template for w in unseen.wordings}
@@ -89,10 +89,10 @@ def test_the_test_split_has_phrasings_of_its_own(kind: str) -> None:
 def test_sections_beyond_the_original_are_proper_sentences() -> None:
     rng = np.random.default_rng(3)
     slots = SIDES | {"d": "20 meters", "v": "20 meters per second"}
-    for section in sections():
-        for template in templates(section):
+    for section in grammar().sections():
+        for template in grammar().templates(section):
             for _ in range(5):
-                text = say(template, slots, rng).text
+                text = grammar().say(template, slots, rng).text
                 assert text.isascii(), text
                 assert text[0].isupper() or text[0].isdigit(), text
                 assert not any(mark in text for mark in "<>{}|()"), text

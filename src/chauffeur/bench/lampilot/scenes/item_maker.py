@@ -8,28 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.scenes import beyond, wish_sampler
 from chauffeur.bench.lampilot.scenes.feasible import FeasibilityVerdict, feasible, impossible, start_of
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, Slot
-from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.bench.lampilot.scenes.wish_sampler import Unfit
 from chauffeur.bench.lampilot.scenes.wishes import SceneWish
 from chauffeur.bench.lampilot.scenes.wording import Candidates, word
-from chauffeur.concept import Observation, Scenario, ScenarioError
+from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 
 MAX_DRAWS = 400
 """Draws after which an item is given up: a kind that fails so often has a fault of its own."""
 _WORDS_KEY = 1_000_000
 """Spawn key of the stream that words are drawn from; scenes are drawn from keys 0, 1, 2, ..."""
-
-
-def draw_wish(kind: str, start: Observation, rng: np.random.Generator) -> SceneWish | Unfit:
-    """A wish that fits the first instant of a drawn road, or why none does. KeyError for an unknown kind."""
-    for names, drawer in (*wish_sampler.WISHES, *beyond.WISHES):
-        if kind.startswith(names):
-            return drawer(kind, start, rng)
-    raise KeyError(kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,18 +43,18 @@ def make_item(job: Job) -> dict[str, Any]:
     Raises:
         ScenarioError: No feasible scene came up.
     """
-    slot = job.slot
+    slot, kind = job.slot, KINDS[job.slot.kind]
     rejected: Counter[str] = Counter()
     for draw in range(MAX_DRAWS):
         rng = _stream(job, draw)
-        env = draw_road(slot.kind, rng)
+        env = kind.road(rng)
         traffic = int(rng.integers(2**31))
         scenario = Scenario(f"{slot.kind}_{slot.index}", "highway", env, traffic)
         start = start_of(HighwayWorld(), scenario)
         if isinstance(start, str):
             rejected[start] += 1
             continue
-        wish = draw_wish(slot.kind, start, rng)
+        wish = kind.wish(slot.kind, start, rng)
         if isinstance(wish, Unfit):
             rejected[wish.why] += 1
             continue
@@ -72,7 +62,7 @@ def make_item(job: Job) -> dict[str, Any]:
         if verdict.why:
             rejected[verdict.why] += 1
             continue
-        candidates = word(wish, KINDS[slot.kind], slot, _stream(job, _WORDS_KEY))
+        candidates = word(wish, kind, slot, _stream(job, _WORDS_KEY))
         return _row(slot, scenario, wish, candidates, verdict, rejected)
     most = ", ".join(f"{why} ({times})" for why, times in rejected.most_common(3))
     raise ScenarioError(

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.scenes.annotations import Annotation, annotated
@@ -151,8 +150,3 @@ def counts(faults: Sequence[Fault]) -> list[tuple[str, str, int]]:
     """(what, why, how often), the most frequent first."""
     held: Counter[tuple[str, str]] = Counter((fault.what, fault.why) for fault in faults)
     return [(what, why, times) for (what, why), times in held.most_common()]
-
-
-def as_row(fault: Fault) -> dict[str, Any]:
-    """A fault as JSON."""
-    return {"what": fault.what, "where": fault.where, "why": fault.why, "text": fault.text}

@@ -184,14 +184,3 @@ def one_goal(kind: str, goal: dict[str, Any], section: str = "", **slots: str | 
 def plain(value: float) -> float | int:
     """A number as a file writes it: whole ones without a point."""
     return int(value) if float(value).is_integer() else round(value, 6)
-
-
-WISHES: tuple[tuple[tuple[str, ...], Drawer], ...] = (
-    (("dec_abs_dis", "inc_abs_dis", "dec_rel_dis", "inc_rel_dis"), distance_wish),
-    (("dec_abs_speed", "inc_abs_speed", "dec_rel_speed", "inc_rel_speed"), speed_wish),
-    (("left_lc", "right_lc"), lane_wish),
-    (("left_overtake", "right_overtake"), overtake_wish),
-    (("pull_over",), pull_over_wish),
-    (("go_straight", "turn_left", "turn_right"), route_wish),
-)
-"""Who draws the wish of a kind, by the beginning of its name."""

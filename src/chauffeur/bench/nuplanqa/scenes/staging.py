@@ -92,22 +92,7 @@ class StagedMover:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class StagedScene(QaScene):
-    """A clip with what it was made from.
-
-    Attributes:
-        plan: The street.
-        ego: The ego.
-        others: All other road users.
-    """
-
-    plan: StreetPlan
-    ego: StagedMover
-    others: tuple[StagedMover, ...]
-
-
-def stage(token: str, rng: np.random.Generator) -> StagedScene:
+def stage(token: str, rng: np.random.Generator) -> QaScene:
     """Draw a scene."""
     while True:
         scene = _draw(token, rng)
@@ -115,7 +100,7 @@ def stage(token: str, rng: np.random.Generator) -> StagedScene:
             return scene
 
 
-def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
+def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
     theme = _THEMES[int(rng.integers(len(_THEMES)))]
     plan = _street(rng, theme)
     motion: Motion = ("still", "steady", "faster", "slower")[int(rng.integers(4))]
@@ -147,7 +132,7 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
     signals = _signals(plan, light)
     shakes = rng.normal(0.0, SHAKE_RAD, SAMPLES).tolist()
     ahead, astride = _ahead(crowd.movers)
-    return StagedScene(
+    return QaScene(
         token=token,
         source=f"staged {plan.kind}",
         kind=plan.kind,
@@ -171,9 +156,6 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
         ahead=ahead,
         unclear=frozenset({"density"} if astride else ()),
         instants=tuple(_observe(plan, road, everybody, signals, place, shake) for place, shake in enumerate(shakes)),
-        plan=plan,
-        ego=ego,
-        others=tuple(crowd.movers),
     )
 
 
