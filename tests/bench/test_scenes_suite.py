@@ -214,7 +214,7 @@ def test_rejections_are_counted(suite: tuple[Path, Any]) -> None:
 
 
 def test_another_suite_in_the_same_folder_is_refused(suite: tuple[Path, Any], tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="other options"):
+    with pytest.raises(ConfigError, match="another configuration"):
         Suite(suite[0], SuiteConfig(n=18, seed=5, extras=10))
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ConfigError, match="not empty"):

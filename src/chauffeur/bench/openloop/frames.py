@@ -25,6 +25,7 @@ from chauffeur.bench.openloop.driving import AXLE_M, TOWNS, UNSEEN_TOWN, FrameMo
 from chauffeur.bench.openloop.extrapolation import FutureKind, kind_of, tells_nothing
 from chauffeur.bench.openloop.nuscenes import FUTURE, HISTORY, in_frame
 from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_file, sample_token, write_tables
+from chauffeur.bench.sets import claim
 from chauffeur.camera import Camera, Conditions, Rig
 from chauffeur.concept import ConfigError, ScenarioError
 from chauffeur.drive.files import publish
@@ -216,7 +217,7 @@ def make_frames(
     """
     from chauffeur.camera import make_renderer
 
-    _claim(root, config)
+    claim(root, {"made": MADE, **asdict(config)}, indent=1)
     total = sum(config.count(split) for split in splits)
     done = 0
     counts: dict[Split, Mapping[str, int]] = {}
@@ -251,16 +252,6 @@ def make_frames(
         renderer.close()
     _card(root, config, counts)
     return counts
-
-
-def _claim(root: Path, config: FramesConfig) -> None:
-    path, wanted = root / "config.json", {"made": MADE, **asdict(config), "towns": list(config.towns)}
-    if path.is_file():
-        if json.loads(path.read_text(encoding="utf-8")) != wanted:
-            raise ConfigError(f"{root} holds a set of another configuration.", hint="Choose another folder.")
-        return
-    root.mkdir(parents=True, exist_ok=True)
-    publish(path, (json.dumps(wanted, indent=1) + "\n").encode(), "configuration")
 
 
 def _card(root: Path, config: FramesConfig, counts: Mapping[Split, Mapping[str, int]]) -> None:

@@ -41,6 +41,7 @@ from chauffeur.bench.nuplanqa.scenes.staging import stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs
 from chauffeur.bench.nuplanqa.scenes.worlds import CLIPS, world_scene
 from chauffeur.bench.openloop.driving import UNSEEN_TOWN, Place
+from chauffeur.bench.sets import claim
 from chauffeur.camera import LOOKS, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
@@ -147,7 +148,7 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
     if not 1 <= config.frames <= SAMPLES:
         raise ConfigError(f"A clip has no {config.frames} instants.", hint=f"Give 1 to {SAMPLES}.")
     own = folder / split
-    _claim(folder, config)
+    claim(folder, {"made": MADE, **asdict(config)})
     rig = config.rig
     look = LOOKS[config.look] if split == "test" else LOOKS["default"]
     renderer = make_renderer() if config.pictures else None
@@ -242,7 +243,7 @@ def make_set(folder: Path, config: QaConfig, workers: int, watch: Watch) -> Made
         raise ConfigError(f"There are no scenes {config.sources!r}.", hint=f"Choose of: {', '.join(SOURCES)}.")
     splits: tuple[Split, ...] = ("train", "val", "test")
     total = sum(map(config.count, splits))
-    _claim(folder, config)
+    claim(folder, {"made": MADE, **asdict(config)})
     shot = config.pictures and workers > 1
     if shot:
         make_renderer().close()  # what is missing is said here, once
@@ -357,14 +358,3 @@ def _pairs(scene: QaScene, facts: list[Fact], each: int, rng: np.random.Generato
 
 def _token(seed: int, split: Split, number: int) -> str:
     return hashlib.sha256(f"{MADE} {seed} {split} {number}".encode()).hexdigest()[:16]
-
-
-def _claim(folder: Path, config: QaConfig) -> None:
-    path = folder / "config.json"
-    wanted = {"made": MADE, **asdict(config)}
-    if path.is_file():
-        if json.loads(path.read_text(encoding="utf-8")) != wanted:
-            raise ConfigError(f"{folder} holds a set of another configuration.", hint="Choose another folder.")
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(path, wanted)

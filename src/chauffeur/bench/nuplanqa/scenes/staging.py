@@ -111,19 +111,19 @@ def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
     own = int(rng.integers(1 if theme == "pass" else 0, plan.lanes))
     ego = StagedMover(EGO_ID, "car", 0.0, plan.lane_offset(own), speed, gain)
     crowd = _Crowd(plan, rng, [])
-    lead = _lead(plan, crowd, rng, own, ego, theme)
+    lead = _lead(crowd, own, ego, theme)
     apart = theme == "dense" and rng.random() < 0.7  # with somebody half beside the ego, nobody counts who is ahead
-    left = None if apart or theme == "pass" else _beside(plan, crowd, rng, own - 1)
-    right = None if apart else _beside(plan, crowd, rng, own + 1)
+    left = None if apart or theme == "pass" else _beside(crowd, own - 1)
+    right = None if apart else _beside(crowd, own + 1)
     behind = None
     if rng.random() < 0.55:
         behind = crowd.add(_vehicle(rng), -float(rng.uniform(11.0, 22.0)), plan.lane_offset(own), speed)
-    walker = _walker(plan, crowd, rng, theme)
+    walker = _walker(crowd, theme)
     light: SignalState | None = None
     if plan.kind == "crossing" and rng.random() < 0.78:
         light = ("red", "yellow", "green")[int(rng.integers(3))]
     near = lead is not None and lead.station_m < _FAR_M[0]
-    _fill(plan, crowd, rng, None if near else own, theme)
+    _fill(crowd, None if near else own, theme)
     road = road_of(plan)
     everybody = (ego, *crowd.movers)
     if _overlap(plan, everybody):
@@ -219,9 +219,8 @@ def _vehicle(rng: np.random.Generator) -> AgentKind:
     return kinds[int(rng.integers(3))]
 
 
-def _lead(
-    plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, own: int, ego: StagedMover, theme: Theme
-) -> StagedMover | None:
+def _lead(crowd: _Crowd, own: int, ego: StagedMover, theme: Theme) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     how = _LEADS[int(rng.integers(len(_LEADS)))]
     if theme in ("pass", "slow"):
         how = "closing"
@@ -262,7 +261,8 @@ def _lead(
     return crowd.add(kind, at, plan.lane_offset(own), its, ego.acceleration_mps2)
 
 
-def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int) -> StagedMover | None:
+def _beside(crowd: _Crowd, lane: int) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     if not 0 <= lane < plan.lanes or rng.random() < 0.3:
         return None
     kind = _vehicle(rng)
@@ -270,7 +270,8 @@ def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int
     return crowd.add(kind, float(rng.uniform(1.0, 8.0)), plan.lane_offset(lane), speed)
 
 
-def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Theme) -> StagedMover | None:
+def _walker(crowd: _Crowd, theme: Theme) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     if plan.crosswalk_m is None or (theme != "walker" and rng.random() < 0.5):
         return None
     side = 1.0 if rng.random() < 0.5 else -1.0
@@ -279,8 +280,9 @@ def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Th
     return crowd.add("pedestrian", plan.crosswalk_m, offset, 0.0, across_mps=-side * 1.3)
 
 
-def _fill(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, empty: int | None, theme: Theme) -> None:
-    """Further traffic: oncoming, farther ahead in other lanes, people on the pavement; nobody in an `empty` lane."""
+def _fill(crowd: _Crowd, empty: int | None, theme: Theme) -> None:
+    """Further traffic: oncoming, farther ahead in other lanes but an `empty` one, people on the pavement."""
+    plan, rng = crowd.plan, crowd.rng
     for index in range(plan.oncoming):
         for _ in range(int(rng.integers(0, 3))):
             at, speed = float(rng.uniform(5.0, 70.0)), float(rng.uniform(4.0, 11.0))
