@@ -196,9 +196,7 @@ class Suite:
         for item in items:
             folders.setdefault(folder_of(item), []).append(item)
         datasets: dict[str, Dataset] = {}
-        for name in sorted(
-            folders, key=lambda name: (name not in _SPLITS, _SPLITS.index(name) if name in _SPLITS else 0)
-        ):
+        for name in sorted(folders, key=lambda name: ([*_SPLITS, name].index(name), name)):
             write_folder(self.folder / name, folders[name])
             datasets[name] = load_dataset(self.folder / name)
         text = json.dumps(self._about | contents_of(rows, items, datasets), indent=1)
