@@ -10,6 +10,7 @@ from chauffeur.concept import ConfigError, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
+RIGHT = {"type": "LaneChangeEval", "direction": "right"}
 BY_ID = {s.id: s for s in BUILT_IN}
 
 
@@ -70,6 +71,14 @@ def test_goals_start_open(scenario: str, goal: dict[str, object]) -> None:
         ("cruise", {"type": "ACCEvalbyDistance", "distance": 20}, "vehicle ahead"),
         ("cruise", {"type": "OvertakeEval", "direction": "left"}, "overtake"),
         ("intersection", {"type": "IntersectionEval", "direction": ["x", "y", 0]}, "not on this road"),
+        ("overtake", {"type": "SequenceEval"}, "malformed"),
+        ("overtake", {"type": "SequenceEval", "steps": []}, "steps"),
+        ("overtake", {"type": "SequenceEval", "steps": [RIGHT, RIGHT]}, "no lane to the right"),
+        ("overtake", {"type": "ChangeEval", "quantity": "colour", "change": 1}, "colour"),
+        ("overtake", {"type": "ChangeEval", "quantity": "speed", "change": 2}, "not 2"),
+        ("overtake", {"type": "ReachEval"}, "malformed"),
+        ("cruise", {"type": "ReachEval", "distance": 20}, "none within 100 m"),
+        ("cruise", {"type": "ChangeEval", "quantity": "distance", "change": 1}, "none within 100 m"),
     ],
 )
 def test_goals_that_cannot_apply_say_so(scenario: str, goal: dict[str, object], message: str) -> None:
