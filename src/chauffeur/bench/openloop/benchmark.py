@@ -350,12 +350,10 @@ class OpenLoopBenchmark:
         if outcome.answer is None and not outcome.error:
             return ()
         sample = outcome.item.sample
-        words = "" if outcome.answer is None else str(outcome.answer["text"])
-        predicted = None if outcome.answer is None else read_waypoints(words)
+        words, predicted, status = read_answer(outcome, FUTURE)
         own = distance_columns(predicted, sample.future)
-        status: OpenLoopStatus = "answered" if predicted is not None else "unreadable"
-        if outcome.answer is None:
-            status, own = "no answer", dict.fromkeys(own)
+        if status == "no answer":
+            own = dict.fromkeys(own)
         columns: dict[str, Any] = {
             "item": sample.id,
             "scene": sample.scene,
@@ -370,6 +368,15 @@ class OpenLoopBenchmark:
             "answer": words,
         }
         return (OpenLoopRow(**columns),)
+
+
+def read_answer(outcome: ItemOutcome[OpenLoopItem], steps: int) -> tuple[str, FloatArray | None, OpenLoopStatus]:
+    """An item's words, the waypoints (steps, 2) in them, and what became of it."""
+    if outcome.answer is None:
+        return "", None, "no answer"
+    words = str(outcome.answer["text"])
+    predicted = read_waypoints(words, steps)
+    return words, predicted, "unreadable" if predicted is None else "answered"
 
 
 def _last_text(turns: Sequence[Any]) -> str:

@@ -20,7 +20,7 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.road_graph import turn_of
-from chauffeur.worlds.base import EGO, Perception, World
+from chauffeur.worlds.base import EGO, World
 
 Place = Literal["town", "highway", "crossing", "lot"]
 Turn = Literal["left", "straight", "right"]
@@ -193,19 +193,15 @@ def _highway(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMomen
                 if rng.random() < 0.15:
                     side = int(rng.choice((-1, 1)))
                     lane = perception.adjacent_lane(perception.lane_of(EGO), side)
-                    if lane is not None and _free(perception, lane):
+                    if lane is not None and all(
+                        one is None or abs(perception.distance_along(EGO, one)) > _CLEAR_M
+                        for one in perception.neighbours(lane)
+                    ):
                         wishes = replace(wishes, target_lane=lane)
                         said, until = ("change left", "change right")[side > 0], seen.time_s + 3.0
             yield _instant(seen, COMMANDS[said], SEES_M)
         wishes = driver.settle(wishes)
         actuate(world, seen, driver.command(wishes), None, None)
-
-
-def _free(perception: Perception, lane: LaneId) -> bool:
-    """Whether nobody is near in a lane."""
-    return all(
-        one is None or abs(perception.distance_along(EGO, one)) > _CLEAR_M for one in perception.neighbours(lane)
-    )
 
 
 def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
@@ -232,6 +228,7 @@ _OTHERWISE: Final = 0.15
 """How often, each half second, the driver in a lot is given another speed."""
 _WAITS_S: Final = 1.0
 _CLEAR_M: Final = 25.0
+"""A lane is free to change to where no vehicle is nearer than this."""
 
 
 def _crossing(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:

@@ -167,15 +167,14 @@ def _drive(root: Path, config: FramesConfig, trip: TrafficTrip, renderer: Render
     made = _Made(
         [(round(float(x), 4), round(float(y), 4), round(float(h), 6)) for x, y, h in poses],
         {i: (moments[i].command, str(kinds[i])) for i in kept},
-        {i: _known(moments[i]) for i in kept},
+        {
+            # lead's gap (m) and speed (m/s), way to the next halt and junction (m)
+            i: [round(value, 2) for value in (one.lead_m, one.lead_mps, one.halt_m, one.junction_m)]
+            for i, one in ((i, moments[i]) for i in kept)
+        },
     )
     publish(record, json.dumps(asdict(made)).encode(), "record of a trip")
     return made
-
-
-def _known(one: FrameMoment) -> list[float]:
-    """Lead's gap (m) and speed (m/s), way to the next halt and junction (m)."""
-    return [round(value, 2) for value in (one.lead_m, one.lead_mps, one.halt_m, one.junction_m)]
 
 
 def _render(

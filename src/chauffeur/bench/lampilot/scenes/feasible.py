@@ -11,7 +11,6 @@ from chauffeur.bench.lampilot.scenes.scripted import programs_for
 from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
 from chauffeur.drive.session import drive_program, drive_without_program
-from chauffeur.geometry import LaneId
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.network import lane_id
 
@@ -67,14 +66,10 @@ def start_of(world: HighwayWorld, scenario: Scenario) -> Observation | str:
         return "the road cannot be set up"
     if start.ego.crashed or start.off_road or start.ended:
         return "starts in a crash"
-    if start.ego.lane is None or not _in_start_lane(scenario, start.ego.lane):
+    ego = scenario.config.get("ego_vehicle")
+    if start.ego.lane is None or (ego is not None and lane_id(ego["start_lane_index"]) != start.ego.lane):
         return "starts in another lane"
     return start
-
-
-def _in_start_lane(scenario: Scenario, lane: LaneId) -> bool:
-    ego = scenario.config.get("ego_vehicle")
-    return ego is None or lane_id(ego["start_lane_index"]) == lane
 
 
 def feasible(scenario: Scenario) -> FeasibilityVerdict:
@@ -94,8 +89,10 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
     programs = programs_for(scenario.goal, describe(start).situation)
     if not programs:
         return FeasibilityVerdict(False, "the expert has no program for it")
-    if _fulfilled_by_itself(world, scenario, goal):
-        return FeasibilityVerdict(False, "fulfilled without doing anything")
+    if scenario.goal["type"] in _EMPTY_WISHES:
+        idle = drive_without_program(world, GoalReferee(world, goal), GIVE_UP_S + 1.0, record=False)
+        if idle.outcome == "success":
+            return FeasibilityVerdict(False, "fulfilled without doing anything")
     why = ""
     for attempt in programs:
         world.reset(scenario)
@@ -103,14 +100,6 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
         if solved:
             return FeasibilityVerdict(True, ticks=ticks, by=attempt.by)
     return FeasibilityVerdict(False, why)
-
-
-def _fulfilled_by_itself(world: HighwayWorld, scenario: Scenario, goal: Goal) -> bool:
-    """Whether a car that ignores the wish fulfils it; the world has just been reset."""
-    if scenario.goal["type"] not in _EMPTY_WISHES:
-        return False
-    referee = GoalReferee(world, goal)
-    return drive_without_program(world, referee, GIVE_UP_S + 1.0, record=False).outcome == "success"
 
 
 def _drive(world: HighwayWorld, scenario: Scenario, source: str) -> tuple[bool, str, int]:

@@ -58,7 +58,11 @@ def make_item(job: Job) -> dict[str, Any]:
         if isinstance(wish, Unfit):
             rejected[wish.why] += 1
             continue
-        verdict = _judge(scenario, wish)
+        verdict = FeasibilityVerdict(True)
+        if wish.right == "drive":
+            verdict = feasible(replace(scenario, goal=wish.goal))
+        elif "_no_" in slot.kind and not impossible(scenario, wish.origin):
+            verdict = FeasibilityVerdict(False, "the wish is possible here")
         if verdict.why:
             rejected[verdict.why] += 1
             continue
@@ -73,15 +77,6 @@ def make_item(job: Job) -> dict[str, Any]:
 
 def _stream(job: Job, key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence([job.seed, job.slot.index], spawn_key=(key,)))
-
-
-def _judge(scenario: Scenario, wish: SceneWish) -> FeasibilityVerdict:
-    """Whether a scene does for a wish."""
-    if wish.right == "drive":
-        return feasible(replace(scenario, goal=wish.goal))
-    if "_no_" in scenario.id and not impossible(scenario, wish.origin):
-        return FeasibilityVerdict(False, "the wish is possible here")
-    return FeasibilityVerdict(True)
 
 
 def _row(

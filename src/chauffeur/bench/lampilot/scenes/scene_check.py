@@ -96,7 +96,7 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
     faults: list[Fault] = []
     readings: dict[tuple[str, str, int], str] = {}
     for item in dataset.items():
-        if item.scenario.goal.get("type") in _NO_READING or _is_hint(notes.get(item.id)):
+        if item.scenario.goal.get("type") in _NO_READING or ((note := notes.get(item.id)) and note.directness):
             continue
         change = changes.get(item.scenario.id, 0)
         key = item.command, str(item.scenario.goal), change
@@ -113,10 +113,6 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
             if said[normal(item.command)] > MOST_SAID
         ]
     return faults
-
-
-def _is_hint(note: Annotation | None) -> bool:
-    return note is not None and note.directness > 0
 
 
 def _scenes(scenes: Mapping[str, Scenario], workers: int, progress: Progress) -> tuple[list[Fault], Mapping[str, int]]:

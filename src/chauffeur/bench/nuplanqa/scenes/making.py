@@ -251,18 +251,13 @@ def make_set(folder: Path, config: QaConfig, workers: int, watch: Watch) -> Made
     done = 0
     made: dict[Split, tuple[VqaItem, ...]] = {}
     for split in splits:
-        before = done
-        told: Watch = _unwatched if shot else lambda some, _, before=before: watch(before + some, total)
-        made[split] = make_split(folder, split, config, told)
+        made[split] = make_split(
+            folder, split, config, lambda some, _, before=done: None if shot else watch(before + some, total)
+        )
         done += config.count(split)
     tried = gate(made["test"], made["train"])
     write_card(folder, config, made, tried)
     return MadeSet({split: len(items) for split, items in made.items()}, tried)
-
-
-def _unwatched(done: int, of: int) -> None:
-    """Tells nobody: the scenes were counted when they were rendered."""
-    del done, of
 
 
 def _shoot_all(
