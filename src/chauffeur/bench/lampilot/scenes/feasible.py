@@ -7,6 +7,7 @@ from typing import Any
 
 from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, make_goal
 from chauffeur.bench.lampilot.referee import GoalJudge
+from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
 from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
@@ -104,7 +105,7 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
 
 def _drive(world: HighwayWorld, scenario: Scenario, source: str) -> tuple[bool, str, int]:
     referee = GoalReferee(world, make_goal(world.perception(), scenario))
-    episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False)
+    episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False, sandbox=unhurried_sandbox())
     if episode.causes.infra_failed:
         raise SandboxError(f"The sandbox failed in scene {scenario.id!r}: {episode.causes.detail}", retryable=True)
     if episode.causes.policy_failed:
