@@ -41,7 +41,7 @@ class Goal(Protocol):
     """A success condition, asked after every control period; without a time limit of its own, the world's ends it."""
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """Whether the task is done at the present instant, `elapsed_s` after it began."""
+        """Rule on the present instant, `elapsed_s` after the task began."""
         ...
 
 
@@ -204,7 +204,7 @@ class SequenceGoal:
     """Several goals one after the other (`SequenceEval`, key `steps`: their `eval` mappings in order).
 
     Each step's goal is set up in the instant in which the one before succeeded, so that "the lane on the right" and
-    "10 m closer" mean what they mean then. A step that cannot be judged yet (nobody ahead) is tried again; each has
+    "10 m closer" mean what they mean then. A step that cannot be judged yet (no lead vehicle) is tried again; each has
     60 s.
     """
 
@@ -246,7 +246,7 @@ class SequenceGoal:
 
 
 class ChangeGoal:
-    """Faster, slower, closer or further back, by an amount that nobody named (`ChangeEval`).
+    """Faster, slower, closer or further back, by an amount that was not named (`ChangeEval`).
 
     Keys: `quantity` is `speed` or `distance` (to the vehicle that was ahead at the start, centre to centre), `change`
     is +1 or -1. The change must last for more than 3 s; 60 s without it is failure.
@@ -297,7 +297,7 @@ class ReachGoal:
 
 
 class _Quantity:
-    """Speed, or distance to the vehicle that was ahead at the start. Raises ScenarioError where nobody was."""
+    """Speed, or distance to the vehicle that was ahead at the start. Raises ScenarioError where there was none."""
 
     def __init__(self, road: RoadPerception, name: str) -> None:
         if name not in ("speed", "distance"):
@@ -312,7 +312,7 @@ class _Quantity:
 
 
 def answered_rightly(goal: Mapping[str, Any], *, refused: bool, success: bool) -> bool:
-    """Whether an item was handled as it should be: its goal reached, or a wish that must not be driven declined.
+    """True if an item was handled rightly: its goal reached, or a wish that must not be driven declined.
 
     Args:
         goal: What it is judged by. Where that is `RefuseEval`, asking back and refusing both leave the car as it is:
@@ -324,7 +324,7 @@ def answered_rightly(goal: Mapping[str, Any], *, refused: bool, success: bool) -
 
 
 class RefuseGoal:
-    """A wish that must not be driven (`RefuseEval`): whoever drives it has failed at once.
+    """A wish that must not be driven (`RefuseEval`): driving it is an immediate failure.
 
     A refusal never reaches a goal; `answered_rightly` is its judge.
     """

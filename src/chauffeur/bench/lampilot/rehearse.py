@@ -36,7 +36,7 @@ _EVERY_TICKS = 5
 
 
 class OriginJudge(GoalJudge):
-    """What a trip is worth under LaMPilot's own ruler, collisions included, while it is driven."""
+    """Worth of a trip under LaMPilot's own ruler, collisions included, while it is driven."""
 
     def __init__(self, road: RoadPerception, scenario: Scenario) -> None:
         super().__init__(road, make_goal(road, scenario))
@@ -61,7 +61,7 @@ class OriginJudge(GoalJudge):
 
     @property
     def worth(self) -> float:
-        """What the trip adds to 100 times the driving score of a run, per item."""
+        """Contribution of the trip to 100 times the driving score of a run, per item."""
         return self._score_after(self._steps, self._least_s) * self.success - COLLISION_WEIGHT * self.collided
 
     @property

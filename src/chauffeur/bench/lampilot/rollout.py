@@ -1,4 +1,4 @@
-"""What a worker process does: put a sample into words, or drive a policy on it. Values in, JSON values out."""
+"""Work of a worker process: drive a policy on a sample. Values in, JSON values out."""
 
 from __future__ import annotations
 

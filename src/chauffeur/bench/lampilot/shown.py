@@ -1,4 +1,4 @@
-"""What a run of LaMPilot-Bench kept of an item, in words and as a drive: same policy and seed give the same trip."""
+"""An item of a stored LaMPilot-Bench run, in words and driven again: same policy and seed give the same trip."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ _CAUSES = (
 
 
 def ending_words(row: AnyRow) -> str:
-    """How an item ended, briefly: `ran out of time or road after 60.0 s`."""
+    """End of an item, briefly: `ran out of time or road after 60.0 s`."""
     text = _ENDINGS.get(str(row["outcome"]), str(row["outcome"]).replace("_", " "))
     if row["outcome"] == "success" and not row["success"]:
         text = "not counted as done"
@@ -78,7 +78,7 @@ def ending_words(row: AnyRow) -> str:
 
 
 def happened(row: AnyRow) -> tuple[str, ...]:
-    """How an item ended and why, in sentences."""
+    """End of an item and its causes, in sentences."""
     ending = ending_words(row)
     sentences = [f"{ending[0].upper()}{ending[1:]}."]
     if row["collision"] and row["outcome"] not in ("collision", "off_road"):
@@ -145,7 +145,7 @@ def _signed(value: float) -> str:
 
 
 class KeptDrive:
-    """What a run kept of its items beside the results: scenes, contexts, plans, verdicts.
+    """Files of a run beside its results: scenes, contexts, plans, verdicts.
 
     Args:
         run: The run.
@@ -180,11 +180,11 @@ class KeptDrive:
         return _valid(plan_adapter, (self._plans.get(str(row["item"])) or {}).get("plan"))
 
     def shielded(self, row: AnyRow) -> bool:
-        """Whether the item was driven under the run-time shield."""
+        """True if the item was driven under the run-time shield."""
         return "shield" in (self._rollouts.get(str(row.get("rollout_key", ""))) or {})
 
     def verdicts(self, row: AnyRow) -> tuple[Verdict, ...]:
-        """What the checks said of the item's plan."""
+        """Verdicts of the checks on the item's plan."""
         rollout = self._rollouts.get(str(row.get("rollout_key", ""))) or {}
         return tuple(Verdict(**verdict) for verdict in rollout.get("verdicts") or ())
 

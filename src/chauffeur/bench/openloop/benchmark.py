@@ -127,7 +127,7 @@ def _column(name: str, whose: Whose) -> str:
 
 
 def failed_of(row: AnyRow, whose: Whose = "l2") -> bool | None:
-    """Whether a stored row is a failure."""
+    """True if a stored row is a failure; None without an answer."""
     return row["failed" if whose == "l2" else "cv_failed"]
 
 
@@ -228,7 +228,7 @@ TABLE_XII: Final = TableSpec(
 
 
 def distance_columns(predicted: FloatArray | None, truth: FloatArray, whose: Whose = "l2") -> dict[str, Any]:
-    """What a row stores of a prediction (6, 2), None for an unreadable one."""
+    """Columns of a prediction (6, 2); None for an unreadable one."""
     found = standing() if predicted is None else predicted
     names = [_column(name, whose) for name in (*_AWAY, *_LAGGED)]
     values = known(np.concatenate([distances(found, truth), lagging(found, truth)]))

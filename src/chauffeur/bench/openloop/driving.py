@@ -64,7 +64,7 @@ class FrameMoment:
 
 @dataclass(frozen=True, slots=True)
 class TrafficTrip:
-    """What decides a trip.
+    """Configuration of a trip.
 
     Attributes:
         name: Unique in its set.
@@ -139,7 +139,7 @@ def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
 
 
 def _next_turn(road: RoadGraph, lanes: tuple[LaneId, ...], ego: VehicleState) -> tuple[Turn | Literal[""], float]:
-    """Which way the junction is crossed that the ego is in or comes to next, and how far away it is, m."""
+    """Way across the junction that the ego is in or comes to next, and the distance to it, m."""
     away = 0.0
     for i, name in enumerate(lanes):
         lane = road[name]
@@ -225,7 +225,7 @@ def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
 
 
 _OTHERWISE: Final = 0.15
-"""How often, each half second, the driver in a lot is given another speed."""
+"""Probability, each half second, that the driver in a lot is given another speed."""
 _WAITS_S: Final = 1.0
 _CLEAR_M: Final = 25.0
 """A lane is free to change to where no vehicle is nearer than this."""

@@ -49,7 +49,7 @@ SHARES: Final[Mapping[FutureKind, float]] = {
     "speeds up": 0.08,
     "goes on": 0.12,
 }
-"""What is kept of a split, at most."""
+"""Greatest share of each kind in a split."""
 PERCEPTION: Final = "perception.json"
 VIEW_RAD: Final = 1.05
 _SKIES: Final = (
@@ -62,7 +62,7 @@ _SKIES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class FramesConfig:
-    """What decides a set.
+    """Configuration of a set.
 
     Attributes:
         trips: Of the training split; the others have an eighth and a quarter.
@@ -125,7 +125,7 @@ def _axle_m(place: Place) -> float:
 
 
 def chosen(kinds: Sequence[FutureKind | None], most: int, rng: np.random.Generator) -> list[int]:
-    """Which moments of a trip are kept: of each kind at most its share of `most`; None are never kept."""
+    """Places of the moments of a trip that are kept: of each kind at most its share of `most`; None are never kept."""
     kept: list[int] = []
     for kind, share in SHARES.items():
         own = [i for i, one in enumerate(kinds) if one == kind]
@@ -136,7 +136,7 @@ def chosen(kinds: Sequence[FutureKind | None], most: int, rng: np.random.Generat
 
 @dataclass(frozen=True, slots=True)
 class _Made:
-    """What is left of a trip: poses, marks (moment, command, kind) and what is known of each marked picture."""
+    """A trip as it is stored: poses, marks (moment, command, kind) and what is known of each marked picture."""
 
     poses: list[tuple[float, float, float]]
     marks: dict[int, tuple[str, str]]

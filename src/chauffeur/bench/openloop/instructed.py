@@ -90,7 +90,7 @@ class InstructedRow:
 
 
 def _compared(row: AnyRow) -> bool:
-    """Whether a method answered with the instruction and without it: no other row is in any mean."""
+    """True if a method answered with the instruction and without it: no other row is in any mean."""
     return row["kind"] != HISTORY_ONLY and row["ade_m"] is not None and row["ade_without_m"] is not None
 
 
@@ -208,7 +208,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """What of the annotations is not asked about, in words."""
+        """Annotations that are not asked about, in words."""
         there = self.tables_read.scenes
         absent = [name for name in self._by_scene if name not in there]
         asked = {one.scene for one in self.samples}

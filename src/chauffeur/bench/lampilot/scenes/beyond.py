@@ -55,7 +55,7 @@ def _change(behaviour: str, start: Observation) -> SceneWish | Unfit:
     if isinstance(lead, Unfit):
         return lead
     if behaviour == "faster":
-        # Held up by somebody, so that there is speed to be gained below the sign.
+        # Held up by a lead vehicle, so that there is speed to be gained below the sign.
         if start.ego.speed_mps > sign_mps(start) - 3.0:
             return Unfit("at the limit already")
         goal = {"type": "ChangeEval", "quantity": "speed", "change": 1}

@@ -1,4 +1,4 @@
-"""Whether a scene can be driven as wished: not spoilt at the start, not fulfilled by itself, solved by the expert."""
+"""Feasibility of a scene: not spoilt at the start, not fulfilled by itself, solved by the expert."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _EMPTY_WISHES = ("ACCEvalbySpeed", "ACCEvalbyDistance", "ChangeEval")
 
 @dataclass(frozen=True, slots=True)
 class FeasibilityVerdict:
-    """Whether a scene is feasible.
+    """Verdict on a scene.
 
     Attributes:
         feasible: The expert solves it without a collision, and it asks for something.
@@ -55,7 +55,7 @@ class GoalReferee(GoalJudge):
 
     @property
     def success(self) -> bool:
-        """Whether the goal is reached and nothing was hit in that instant."""
+        """True if the goal is reached and nothing was hit in that instant."""
         return self._ruling == "success" and not self._crashed
 
 
@@ -124,7 +124,7 @@ _WORDS = {
 
 
 def impossible(scenario: Scenario, wish: dict[str, Any]) -> bool:
-    """Whether the world itself says that a wish cannot be judged in a scene: no such lane, nobody ahead, no shoulder.
+    """True if the world itself cannot judge a wish in a scene: no such lane, no lead vehicle, no shoulder.
 
     Raises:
         ScenarioError: The scene cannot be set up.

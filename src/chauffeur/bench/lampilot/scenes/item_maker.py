@@ -38,7 +38,7 @@ class Job:
 def make_item(job: Job) -> dict[str, Any]:
     """Draw until a scene is feasible, then word it; a row keyed by `index`.
 
-    Everything random comes from `SeedSequence([seed, index])`, so an item is the same whoever makes it and when.
+    Everything random comes from `SeedSequence([seed, index])`, so an item does not depend on the worker or the time.
 
     Raises:
         ScenarioError: No feasible scene came up.

@@ -1,4 +1,4 @@
-"""What a suite is made of: kinds of scenes, how many of each, and which split each item belongs to (paper Tab. III)."""
+"""Plan of a suite: kinds of scenes, how many of each, and which split each item belongs to (paper Tab. III)."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ MAIN: tuple[Kind, ...] = (
 )
 
 EXTRA_SHARES: Mapping[str, int] = {"directness": 6, "steps": 4, "refusals": 5, "units": 5}
-"""How the extras divide into parts."""
+"""Shares of the parts among the extras."""
 
 _BEHAVIOURS = {
     "faster": roads.dense,

@@ -23,7 +23,7 @@ from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 _SPLITS = ("train", "val", "test")
 MOST_SAID = 2
-"""How often a sentence may come in a folder whose items have words of their own."""
+"""Repetitions of a sentence allowed in a folder whose items have words of their own."""
 _NO_READING = ("SequenceEval", "ChangeEval", "RefuseEval")
 """Goals whose words are not read back: several things, hints, and wishes to refuse."""
 
@@ -116,7 +116,7 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
 
 
 def _scenes(scenes: Mapping[str, Scenario], workers: int, progress: Progress) -> tuple[list[Fault], Mapping[str, int]]:
-    """What is wrong with scenes, in their order, and which change (+1, -1) each asks for where it names a number."""
+    """Faults of scenes, in their order, and the change (+1, -1) each asks for where it names a number."""
     rows: dict[str, Row] = {}
     progress(0, len(scenes))
 

@@ -15,7 +15,7 @@ from chauffeur.worlds.highway.dblv1 import Dataset
 
 @dataclass(frozen=True, slots=True)
 class SceneStatistics:
-    """What Tab. III counts, and how much sentences repeat.
+    """Counts of Tab. III, and how much sentences repeat.
 
     Attributes:
         items: Number of items.

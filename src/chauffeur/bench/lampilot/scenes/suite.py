@@ -75,7 +75,7 @@ def _scenes(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _drawn(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """How many scenes were kept and drawn, and why the others were rejected."""
+    """Numbers of scenes kept and drawn, and reasons for rejecting the others."""
     why = sum((Counter(row["rejected"]) for row in rows), Counter[str]())
     return {"kept": len(rows), "drawn": len(rows) + why.total(), "rejected": dict(why.most_common())}
 

@@ -1,6 +1,6 @@
 """Wishes of the original's kinds, drawn to fit the first instant of a drawn road.
 
-A wish makes sense where it is said: there is somebody to follow, a gap to close, a speed that is not driven already.
+A wish makes sense where it is said: there is a lead vehicle, a gap to close, a speed that is not driven already.
 Where none does, the draw is given up with a reason.
 """
 
@@ -43,7 +43,7 @@ EXITS: dict[str, tuple[str, str, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class Unfit:
-    """Why a drawn road does not suit its kind, in a few words for counting."""
+    """Reason why a drawn road does not suit its kind, short enough for counting."""
 
     why: str
 

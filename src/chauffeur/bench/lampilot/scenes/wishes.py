@@ -1,4 +1,4 @@
-"""What is wished in a scene, before it is put into words: the goal, the values named, and what the right answer is."""
+"""A wish of a scene before it is put into words: the goal, the values named, and what the right answer is."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Literal
 from chauffeur.concept import units
 
 Right = Literal["drive", "refuse", "ask"]
-"""What a good planner does: drive the goal, refuse the wish, or ask back."""
+"""Right answer of a planner: drive the goal, refuse the wish, or ask back."""
 
 System = Literal["metric", "imperial", "informal"]
 

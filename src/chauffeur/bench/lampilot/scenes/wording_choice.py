@@ -22,7 +22,7 @@ from chauffeur.language.tokens import tokens_of
 
 Row = Mapping[str, Any]
 _CLOSE_WORDS = 0.02
-"""How near the mean length is brought to Tab. III's."""
+"""Words by which the mean length may differ from Tab. III's."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What a set of questions must not give away: its gate.
+"""The gate of a set of questions: it must not give away its answers.
 
 Whoever reads only options, or options and control signals, or goes by lengths or letters, must do little better than
 chance (25 %). The bound is 35 %.
@@ -45,12 +45,12 @@ class GateLine:
         return f"{self.worst} {self.worst_accuracy:.1%}" if self.worst else "too few questions"
 
     def passes(self, bound: float = BOUND) -> bool:
-        """Whether the set withstands it: over all questions, where there are enough to tell."""
+        """True if the set withstands it: over all questions, where there are enough to tell."""
         return self.questions < LEAST or self.accuracy <= bound
 
 
 def gate(items: Sequence[VqaItem], taught: Sequence[VqaItem] = ()) -> tuple[GateLine, ...]:
-    """How far each trick leads.
+    """Accuracy of each trick.
 
     Args:
         items: The set.

@@ -69,7 +69,7 @@ _CYCLE: Final[tuple[Place | Staged, ...]] = (
     *(_STAGED, "highway", _STAGED, "town", _STAGED, "highway"),
     *(_STAGED, "town", _STAGED, "highway", "crossing", "lot"),
 )
-"""Where scenes come from, one after the other."""
+"""Sources of scenes, one after the other."""
 assert _CYCLE.count("town") == CLIPS
 SOURCES: Final[Mapping[str, tuple[Place | Staged, ...]]] = {
     "all": _CYCLE,
@@ -85,7 +85,7 @@ _SEED_OF: Final[Mapping[Split, int]] = {"train": 0, "val": 1, "test": 2}
 
 @dataclass(frozen=True, slots=True)
 class QaConfig:
-    """What decides a set.
+    """Configuration of a set.
 
     Attributes:
         scenes: Of the training split; the others have a fifth each.
@@ -123,7 +123,7 @@ class QaConfig:
 
     @property
     def instants(self) -> tuple[int, ...]:
-        """Which instants of a clip are rendered: the last ones; of two the first and the last, which show most."""
+        """Rendered instants of a clip: the last ones; of two the first and the last, which show most."""
         return (0, SAMPLES - 1) if self.frames == 2 else tuple(range(SAMPLES - self.frames, SAMPLES))
 
 
@@ -217,7 +217,7 @@ def shoot_part(folder: Path, split: Split, config: QaConfig, part: int, parts: i
 
 @dataclass(frozen=True, slots=True)
 class MadeSet:
-    """What came of making a set: questions by split, and the gate over the test split."""
+    """Result of making a set: questions by split, and the gate over the test split."""
 
     questions: Mapping[str, int]
     gate: tuple[GateLine, ...]

@@ -1,8 +1,8 @@
-"""Scenes on streets: who is where, how everybody has moved for the last two seconds, light and weather.
+"""Scenes on streets: road users, their motion over the last two seconds, light and weather.
 
 What a question asks about (ego motion, lights, weather, who is ahead, beside and behind, people on the road) is drawn
 independently, so that neither the control signals nor one fact gives another away. Road users keep a constant
-acceleration along their lane; nobody overlaps at any instant. These are staged scenes: no simulator has driven them.
+acceleration along their lane; no two overlap at any instant. These are staged scenes: no simulator has driven them.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ TOP_MPS: Final = 14.0
 EGO_SIZE: Final = (5.2, 2.0)
 Theme = Literal["any", "junction", "walker", "pass", "slow", "dense"]
 _THEMES: Final[tuple[Theme, ...]] = ("any", "any", "junction", "junction", "walker", "pass", "slow", "dense")
-"""What a scene is about. Without themes, a walker with nothing else to heed or a lane free to pass in is rare."""
+"""Theme of a scene. Without themes, a walker with nothing else to heed or a lane free to pass in is rare."""
 _LEADS: Final = ("none", "none", "near", "near", "closing", "opening", "opening", "far")
 _FAR_M: Final = (30.0, 95.0)
-"""Where a lead vehicle of `far` is; only the nearer ones are asked about."""
+"""Distance of a lead vehicle of `far`, m; only the nearer ones are asked about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,9 @@ def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
     ego = StagedMover(EGO_ID, "car", 0.0, plan.lane_offset(own), speed, gain)
     crowd = _Crowd(plan, rng, [])
     lead = _lead(crowd, own, ego, theme)
-    apart = theme == "dense" and rng.random() < 0.7  # with somebody half beside the ego, nobody counts who is ahead
+    apart = (
+        theme == "dense" and rng.random() < 0.7
+    )  # with a vehicle half beside the ego, the count of those ahead is unclear
     left = None if apart or theme == "pass" else _beside(crowd, own - 1)
     right = None if apart else _beside(crowd, own + 1)
     behind = None
@@ -125,8 +127,8 @@ def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
     near = lead is not None and lead.station_m < _FAR_M[0]
     _fill(crowd, None if near else own, theme)
     road = road_of(plan)
-    everybody = (ego, *crowd.movers)
-    if _overlap(plan, everybody):
+    movers = (ego, *crowd.movers)
+    if _overlap(plan, movers):
         return None
     sky: Sky = SKIES[int(rng.integers(len(SKIES)))]
     signals = _signals(plan, light)
@@ -155,7 +157,7 @@ def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
         walker_from="left" if walker is not None and walker.across_mps < 0.0 else "right",
         ahead=ahead,
         unclear=frozenset({"density"} if astride else ()),
-        instants=tuple(_observe(plan, road, everybody, signals, place, shake) for place, shake in enumerate(shakes)),
+        instants=tuple(_observe(plan, road, movers, signals, place, shake) for place, shake in enumerate(shakes)),
     )
 
 
@@ -302,11 +304,11 @@ def _fill(crowd: _Crowd, empty: int | None, theme: Theme) -> None:
             crowd.add("pedestrian", float(rng.uniform(-20.0, 45.0)), offset, float(rng.choice([-1.3, 1.3])))
 
 
-def _overlap(plan: StreetPlan, everybody: Sequence[StagedMover]) -> bool:
-    """Whether two are closer than half a metre at any instant."""
+def _overlap(plan: StreetPlan, movers: Sequence[StagedMover]) -> bool:
+    """True if two road users are closer than half a metre at any instant."""
     for place in range(SAMPLES):
         ago = STEP_S * (SAMPLES - 1 - place)
-        boxes = [_state(plan, mover.at(ago)).box for mover in everybody]
+        boxes = [_state(plan, mover.at(ago)).box for mover in movers]
         for i, one in enumerate(boxes):
             for other in boxes[i + 1 :]:
                 reach = (one.length_m + other.length_m) / 2.0 + 2.0
@@ -339,14 +341,14 @@ def _signals(plan: StreetPlan, light: SignalState | None) -> tuple[Signal, ...]:
 def _observe(
     plan: StreetPlan,
     road: RoadGraph,
-    everybody: Sequence[StagedMover],
+    movers: Sequence[StagedMover],
     signals: tuple[Signal, ...],
     place: int,
     shake_rad: float,
 ) -> Observation:
     """The instant of a place in the clip; the ego's front wheels are shaken by a small angle, as a driver's are."""
     ago = STEP_S * (SAMPLES - 1 - place)
-    ego, *others = (_state(plan, mover.at(ago)) for mover in everybody)
+    ego, *others = (_state(plan, mover.at(ago)) for mover in movers)
     return Observation(
         time_s=place * STEP_S,
         tick=place,

@@ -25,7 +25,7 @@ _STEP_M: Final = 4.0
 
 @dataclass(frozen=True, slots=True)
 class StreetPlan:
-    """What a street is like.
+    """Layout of a street.
 
     Attributes:
         kind: `highway` (no oncoming traffic), `street` (two-way, pavements), `crossing` (a street with a junction).
