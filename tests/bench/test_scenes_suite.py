@@ -26,8 +26,7 @@ from chauffeur.bench.lampilot.scenes.kinds import (
     apportion,
     plan_suite,
 )
-from chauffeur.bench.lampilot.scenes.scene_check import Fault, check, counts, folders_of
-from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
+from chauffeur.bench.lampilot.scenes.scene_check import Fault, check, counts, folders_of, statistics_of, table
 from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
 from chauffeur.bench.lampilot.scenes.wording_choice import normal
 from chauffeur.cli.main import app

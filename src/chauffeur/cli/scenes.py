@@ -178,8 +178,7 @@ def check(
 @scenes_app.command(epilog=STATS_EXAMPLES)
 def stats(data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")]) -> None:
     """The columns of Tab. III for any DbLv1 folder, next to the paper's. Extras of a suite are counted apart."""
-    from chauffeur.bench.lampilot.scenes.scene_check import folders_of
-    from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
+    from chauffeur.bench.lampilot.scenes.scene_check import folders_of, statistics_of, table
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset
 

@@ -18,13 +18,12 @@ from typing import Any
 from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot.scenes.annotations import FILE
 from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
-from chauffeur.bench.lampilot.scenes.job_pool import Progress, spread
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, plan_suite
+from chauffeur.bench.lampilot.scenes.scene_check import statistics_of
 from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
-from chauffeur.bench.lampilot.scenes.statistics import statistics_of
 from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, normal
 from chauffeur.bench.lampilot.scenes.writer import SceneItem, folder_of, items_of, write_folder
-from chauffeur.bench.sets import claim
+from chauffeur.bench.sets import Progress, claim, spread
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld
