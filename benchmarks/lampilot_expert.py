@@ -34,7 +34,7 @@ from chauffeur.bench.lampilot.expert import EXPERT, expert_program, variants
 from chauffeur.bench.lampilot.goals import DistanceGoal, make_goal
 from chauffeur.bench.lampilot.metrics import ORIGIN, driving_score, points
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.bench.lampilot.rehearse import Crew, rehearsed
+from chauffeur.bench.lampilot.rehearse import rehearsed
 from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.drive.rehearsal import best_of
 from chauffeur.drive.session import drive_program
@@ -186,27 +186,21 @@ def rehearsal_table(rows: Sequence[Row]) -> str:
 
 def times(jobs: Sequence[Job], count: int) -> str:
     """Seconds a choice takes; each scene's reset and the workers' start are paid before."""
-    lines: list[list[str]] = []
-    with Crew(helpers=1) as crew:
-        for name, processes in (("one process", 1), ("two processes", 2)):
-            found: list[float] = []
-            for job in jobs:
-                sources = variants(job.scenario.goal, count, 0)
-                lasted = 0.0
-                for _ in range(2):
-                    begin = time.perf_counter()
-                    if processes == 1:
-                        world = HighwayWorld()
-                        world.reset(job.scenario)
-                        rehearsed(world, job.scenario, sources, sandbox=sandbox())
-                    else:
-                        crew.rehearsed(job.scenario, sources)
-                    lasted = time.perf_counter() - begin
-                found.append(lasted)
-            found.sort()
-            nine = found[min(len(found) - 1, round(0.95 * len(found)))]
-            lines.append([name, str(len(found)), f"{statistics.median(found):.2f}", f"{nine:.2f}", f"{found[-1]:.2f}"])
-    return markdown((f"K={count}", "Wishes", "median s", "95 % s", "longest s"), lines)
+    found: list[float] = []
+    for job in jobs:
+        sources = variants(job.scenario.goal, count, 0)
+        lasted = 0.0
+        for _ in range(2):
+            begin = time.perf_counter()
+            world = HighwayWorld()
+            world.reset(job.scenario)
+            rehearsed(world, job.scenario, sources, sandbox=sandbox())
+            lasted = time.perf_counter() - begin
+        found.append(lasted)
+    found.sort()
+    nine = found[min(len(found) - 1, round(0.95 * len(found)))]
+    line = ["one process", str(len(found)), f"{statistics.median(found):.2f}", f"{nine:.2f}", f"{found[-1]:.2f}"]
+    return markdown((f"K={count}", "Wishes", "median s", "95 % s", "longest s"), [line])
 
 
 def main() -> None:

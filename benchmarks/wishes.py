@@ -19,7 +19,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.lampilot.goals_more import answered_rightly
+from chauffeur.bench.lampilot.goals import answered_rightly
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.rollout import RolloutJob, plan_adapter, roll_out
 from chauffeur.bench.passengers import PassengerRequests

@@ -4,10 +4,35 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
+from small_run import Inline
+
+from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.run import Effort
+from chauffeur.concept import Usage
+from chauffeur.planners.base import Prose
+
+EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
+
+
+class Scripted:
+    """Answers by a function of the last text; keeps what it was asked."""
+
+    id = model = "scripted"
+
+    def __init__(self, answer: Callable[[str], str]) -> None:
+        self.answer, self.seen = answer, list[Any]()
+
+    async def write(self, messages: Sequence[Any]) -> Prose:
+        self.seen.append(messages)
+        content = messages[-1]["content"]
+        text = content if isinstance(content, str) else content[-1]["text"]
+        return Prose(self.answer(text), whole=True, model="scripted", usage=Usage())
+
 
 ROTATION = 0.7
 """World heading of the first scene: nothing may depend on it being zero."""

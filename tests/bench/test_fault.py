@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -49,69 +50,44 @@ class _Arranged:
         return seen, log
 
 
-def test_running_into_the_lead_is_the_egos_fault() -> None:
+@pytest.mark.parametrize(
+    ("ego", "other", "driven", "steps", "fault"),
+    [
+        pytest.param((500.0, 1, 25.0), (530.0, 1, 5.0), True, 100, "ego", id="runs into the lead vehicle"),
+        pytest.param((500.0, 1, 0.0), (420.0, 1, 30.0), False, 100, "struck", id="stands and is run into"),
+        pytest.param((500.0, 1, 15.0), (450.0, 1, 30.0), False, 150, "struck", id="keeps its lane and is run into"),
+        pytest.param((500.0, 1, 20.0, 0.12), (494.0, 2, 24.0), False, 40, "ego", id="cuts in and is hit from behind"),
+        pytest.param((500.0, 1, 20.0), (502.0, 2, 21.0, -0.12), False, 40, "struck", id="the other comes over"),
+    ],
+)
+def test_who_caused_a_collision(
+    ego: tuple[Any, ...], other: tuple[Any, ...], driven: bool, steps: int, fault: str
+) -> None:
     scene = _Arranged()
-    scene.put(EGO, 500.0, 1, 25.0)
-    scene.put(1, 530.0, 1, 5.0)
-    _, log = scene.drive(100, Command(0.0, 0.0))
-    assert log.signals().crashed
-    assert log.signals().fault == "ego"
-    assert log.signals().ttc_lane_s == pytest.approx(0.0, abs=0.1)
+    scene.put(EGO, *ego)
+    scene.put(1, *other)
+    if not driven:
+        scene.let_go(1)
+    _, log = scene.drive(steps, Command(0.0, 0.0))
+    found = log.signals()
+    assert found.crashed and found.fault == fault
+    if driven:
+        assert found.ttc_lane_s == pytest.approx(0.0, abs=0.1)
 
 
-def test_standing_and_run_into_is_struck() -> None:
+@pytest.mark.parametrize(
+    ("ego", "fault", "past_end"),
+    [((500.0, 3, 20.0, math.radians(30)), "ego", False), ((1998.0, 1, 30.0), "road_end", True)],
+)
+def test_leaving_the_road_sideways_is_the_egos_fault_and_its_end_is_not(
+    ego: tuple[Any, ...], fault: str, past_end: bool
+) -> None:
     scene = _Arranged()
-    scene.put(EGO, 500.0, 1, 0.0)
-    scene.put(1, 420.0, 1, 30.0)
-    scene.let_go(1)
-    seen, log = scene.drive(100, Command(0.0, 0.0))
-    assert seen[-1].crashed
-    assert log.signals().fault == "struck"
-
-
-def test_run_into_from_behind_while_keeping_the_lane_is_struck() -> None:
-    scene = _Arranged()
-    scene.put(EGO, 500.0, 1, 15.0)
-    scene.put(1, 450.0, 1, 30.0)
-    scene.let_go(1)
-    _, log = scene.drive(150, Command(0.0, 0.0))
-    assert log.signals().crashed
-    assert log.signals().fault == "struck"
-
-
-def test_cutting_in_is_the_egos_fault_even_if_hit_from_behind() -> None:
-    scene = _Arranged()
-    scene.put(EGO, 500.0, 1, 20.0, heading=0.12)
-    scene.put(1, 494.0, 2, 24.0)
-    scene.let_go(1)
-    _, log = scene.drive(40, Command(0.0, 0.0))
-    assert log.signals().crashed
-    assert log.signals().fault == "ego"
-
-
-def test_a_car_that_comes_over_strikes() -> None:
-    scene = _Arranged()
-    scene.put(EGO, 500.0, 1, 20.0)
-    scene.put(1, 502.0, 2, 21.0, heading=-0.12)
-    scene.let_go(1)
-    _, log = scene.drive(40, Command(0.0, 0.0))
-    assert log.signals().crashed
-    assert log.signals().fault == "struck"
-
-
-def test_leaving_the_road_sideways_is_the_egos_fault_and_the_end_of_the_road_nobodys() -> None:
-    scene = _Arranged()
-    scene.put(EGO, 500.0, 3, 20.0, heading=math.radians(30))
+    scene.put(EGO, *ego)
     scene.core.floats[1, at.X] -= 5000.0
     _, log = scene.drive(10, Command(0.0, 0.0))
-    assert log.signals().off_road
-    assert log.signals().fault == "ego"
-    scene = _Arranged()
-    scene.put(EGO, 1998.0, 1, 30.0)
-    scene.core.floats[1, at.X] -= 5000.0
-    _, log = scene.drive(10, Command(0.0, 0.0))
-    assert log.signals().past_end
-    assert log.signals().fault == "road_end"
+    found = log.signals()
+    assert (found.off_road, found.past_end, found.fault) == (True, past_end, fault)
 
 
 def test_nothing_near_is_blamed_on_the_ego() -> None:

@@ -4,12 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, _Held, make_goal
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, make_goal
 from chauffeur.bench.lampilot.metrics import PAPER, RULERS, metrics_of, points
 from chauffeur.concept import ConfigError, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
+RIGHT = {"type": "LaneChangeEval", "direction": "right"}
 BY_ID = {s.id: s for s in BUILT_IN}
 
 
@@ -24,26 +25,22 @@ def _with_goal(name: str, **goal: object) -> Scenario:
     return Scenario(scenario.id, scenario.world, scenario.config, scenario.seed, goal=dict(goal))
 
 
-def test_a_condition_must_be_held_for_longer_than_five_seconds() -> None:
-    held = _Held()
-    rulings = [held.judge(t / 10, reached=True, lost=False) for t in range(1, 60)]
+def test_a_speed_must_be_held_for_longer_than_five_seconds_within_a_minute() -> None:
+    road = _world("cruise").perception()
+    now = road.instant()
+    there, elsewhere = now._replace(speed_mps=20.0), now._replace(speed_mps=25.0)
+
+    def ruled(*instants: tuple[float, bool]) -> list[str]:
+        goal = make_goal(road, _with_goal("cruise", type="ACCEvalbySpeed", speed=20))
+        return [goal.rule(t, there if reached else elsewhere) for t, reached in instants]
+
+    rulings = ruled(*((t / 10, True) for t in range(1, 60)))
     # Reached at 0.1 s; the first instant more than 5 s later is 5.2 s (float time, as in the origin).
     assert rulings.index("success") in (50, 51)
     assert (rulings.index("success") + 1) / 10 > 0.1 + HOLD_S
-
-
-def test_losing_the_condition_restarts_the_clock() -> None:
-    held = _Held()
-    for t in range(1, 40):
-        assert held.judge(t / 10, reached=True, lost=False) == "open"
-    assert held.judge(4.0, reached=False, lost=True) == "open"
-    assert held.judge(4.1, reached=True, lost=False) == "open"
-    assert held.judge(9.0, reached=True, lost=False) == "open"
-    assert held.judge(9.3, reached=True, lost=False) == "success"
-
-
-def test_time_runs_out() -> None:
-    assert _Held().judge(GIVE_UP_S + 0.1, reached=False, lost=False) == "failure"
+    lost = ruled((0.1, True), (4.0, False), (4.1, True), (9.0, True), (9.3, True))
+    assert lost == ["open"] * 4 + ["success"]
+    assert ruled((GIVE_UP_S + 0.1, False)) == ["failure"]
 
 
 @pytest.mark.parametrize(
@@ -74,6 +71,14 @@ def test_goals_start_open(scenario: str, goal: dict[str, object]) -> None:
         ("cruise", {"type": "ACCEvalbyDistance", "distance": 20}, "vehicle ahead"),
         ("cruise", {"type": "OvertakeEval", "direction": "left"}, "overtake"),
         ("intersection", {"type": "IntersectionEval", "direction": ["x", "y", 0]}, "not on this road"),
+        ("overtake", {"type": "SequenceEval"}, "malformed"),
+        ("overtake", {"type": "SequenceEval", "steps": []}, "steps"),
+        ("overtake", {"type": "SequenceEval", "steps": [RIGHT, RIGHT]}, "no lane to the right"),
+        ("overtake", {"type": "ChangeEval", "quantity": "colour", "change": 1}, "colour"),
+        ("overtake", {"type": "ChangeEval", "quantity": "speed", "change": 2}, "not 2"),
+        ("overtake", {"type": "ReachEval"}, "malformed"),
+        ("cruise", {"type": "ReachEval", "distance": 20}, "none within 100 m"),
+        ("cruise", {"type": "ChangeEval", "quantity": "distance", "change": 1}, "none within 100 m"),
     ],
 )
 def test_goals_that_cannot_apply_say_so(scenario: str, goal: dict[str, object], message: str) -> None:

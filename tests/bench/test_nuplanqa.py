@@ -87,7 +87,11 @@ def test_shifts_move_the_options_and_the_answer() -> None:
 
 def test_it_is_a_benchmark_of_the_kernel(tmp_path: Path) -> None:
     write_set(tmp_path)
-    assert faults(NuPlanQaBenchmark(str(tmp_path))) == []
+    bench = NuPlanQaBenchmark(str(tmp_path))
+    assert faults(bench) == []
+    assert list(bench.rows(ItemOutcome(bench.items()[0], None, "", None))) == [], (
+        "nothing is said of what was not asked"
+    )
 
 
 def test_a_model_that_knows_is_right_and_one_that_says_b_is_not(tmp_path: Path) -> None:
@@ -174,12 +178,6 @@ def test_an_answer_that_chooses_nothing_counts_as_wrong(tmp_path: Path) -> None:
     assert {(row["status"], row["correct"], row["detail"]) for row in rows} == {("no choice", False, "refused")}
 
 
-def test_nothing_is_said_of_what_was_not_asked(tmp_path: Path) -> None:
-    write_set(tmp_path)
-    bench = NuPlanQaBenchmark(str(tmp_path))
-    assert list(bench.rows(ItemOutcome(bench.items()[0], None, "", None))) == []
-
-
 class _Planted:
     def __reduce__(self) -> Any:
         return (print, ("run by a pickle",))
@@ -223,8 +221,7 @@ def test_the_papers_rows_stand_beside_ours() -> None:
     assert fill(TABLE_VI, rows[:8]).cells[0][-1] == "n/a"
 
 
-def test_cameras_of_the_published_metadata() -> None:
-    assert CAMERAS == ("CAM_F0", "CAM_L0", "CAM_R0", "CAM_L2", "CAM_R2", "CAM_B0")
+CAMS = {one: {"data_path": "x.jpg"} for one in CAMERAS}
 
 
 @pytest.mark.parametrize(
@@ -236,20 +233,14 @@ def test_cameras_of_the_published_metadata() -> None:
         ({"cams": {one: {"data_path": 3} for one in CAMERAS}}, "Missing view"),
         ({"cams": {one: {"data_path": "../../x.jpg"} for one in CAMERAS}}, "outside of the set"),
         ({"cams": {one: {"data_path": "/etc/passwd"} for one in CAMERAS}}, "outside of the set"),
+        *(
+            ({"cams": CAMS, "timestamp": now, "prev": "a"}, "time stamps")
+            for now in ("noon", 5, 4, [], float("nan"), 10**400)
+        ),
     ],
+    ids=lambda one: str(one)[:12],
 )
 def test_metadata_of_another_shape_are_named(tmp_path: Path, odd: dict[str, Any], says: str) -> None:
-    source = FrameSource(tmp_path, {"t": odd})
+    source = FrameSource(tmp_path, {"t": odd, "a": {"cams": CAMS, "timestamp": 5}})
     with pytest.raises(DataError, match=says):
         source.paths("t")
-
-
-@pytest.mark.parametrize(
-    "stamps", [(5, "noon"), (5, 5), (9, 5), ([], 5), (float("nan"), 5), (10**400, 5)], ids=lambda one: str(one)[:12]
-)
-def test_frames_that_are_not_before_one_another_are_named(tmp_path: Path, stamps: tuple[Any, Any]) -> None:
-    cams = {one: {"data_path": "x.jpg"} for one in CAMERAS}
-    before, now = stamps
-    rows = {"a": {"cams": cams, "timestamp": before}, "b": {"cams": cams, "timestamp": now, "prev": "a"}}
-    with pytest.raises(DataError, match="time stamps"):
-        FrameSource(tmp_path, rows).paths("b")

@@ -11,7 +11,7 @@ import pytest
 from chauffeur.bench.nuplanqa.scenes.facts import FAMILIES, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.reading import motion_of, read_scene
 from chauffeur.bench.nuplanqa.scenes.scene import SAMPLES, QaScene
-from chauffeur.bench.nuplanqa.scenes.staging import StagedScene, stage
+from chauffeur.bench.nuplanqa.scenes.staging import stage
 from chauffeur.bench.nuplanqa.scenes.wording import word_bank
 from chauffeur.bench.nuplanqa.scenes.worlds import world_scene
 from chauffeur.bench.openloop.driving import TOWNS, UNSEEN_TOWN, Place
@@ -24,7 +24,7 @@ def drawn(place: Place, number: int, *, test: bool = False) -> QaScene:
     return world_scene(f"{number:016x}", place, number, test, np.random.default_rng([3, number]))
 
 
-def read(staged: StagedScene) -> QaScene | None:
+def read(staged: QaScene) -> QaScene | None:
     """A staged scene read from its observations alone."""
     lane = f"own.{staged.own}"
     instants = [replace(one, ego=replace(one.ego, lane=lane)) for one in staged.instants]

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from coached_data import server_module
-from openloop_data import ROTATION, SCENES, write_nuscenes
-from small_run import Inline, quiet
+from openloop_data import EFFORT, ROTATION, SCENES, Scripted, write_nuscenes
+from small_run import quiet
 from typer.testing import CliRunner
 
-from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.report import fill, published_lines
-from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.run import BenchRun
 from chauffeur.bench.openloop import OpenLoopBenchmark
 from chauffeur.bench.openloop.benchmark import TABLE_XII, errors_of
 from chauffeur.bench.openloop.conventions import CONVENTIONS, L2Errors, errors, fails, standing
@@ -27,27 +26,10 @@ from chauffeur.bench.openloop.nuscenes import NuScenesTables
 from chauffeur.bench.openloop.requests import THOUGHTS, context_of, read_context, training_lines, waypoints_text
 from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.cli.main import app
-from chauffeur.concept import ConfigError, DataError, Usage
-from chauffeur.planners.base import Prose
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.planners.registry import make_answerer
 
-EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
 PATH = np.array([[4.0, 0.1], [8.0, 0.2], [12.0, -0.3], [16.0, 0.4], [20.0, 0.5], [24.0, 0.6]])
-
-
-class Scripted:
-    """Answers by a function of the last text; keeps what it was asked."""
-
-    id = model = "scripted"
-
-    def __init__(self, answer: Any) -> None:
-        self.answer, self.seen = answer, list[Any]()
-
-    async def write(self, messages: Sequence[Any]) -> Prose:
-        self.seen.append(messages)
-        content = messages[-1]["content"]
-        text = content if isinstance(content, str) else content[-1]["text"]
-        return Prose(self.answer(text), whole=True, model="scripted", usage=Usage())
 
 
 def run(folder: Path, who: Any, **options: Any) -> tuple[BenchRun, list[dict[str, Any]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,13 @@ import numpy as np
 import openloop_data
 import pytest
 from coached_data import server_module
-from openloop_data import circle, straight, write_nuscenes
-from small_run import Inline, quiet
+from openloop_data import EFFORT, Scripted, circle, straight, write_nuscenes
+from small_run import quiet
 from typer.testing import CliRunner
 
-from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.report import fill
-from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.run import BenchRun
 from chauffeur.bench.openloop.doscenes import SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.instructed import HISTORY_ONLY, MODEL, STEPS, InstructedBenchmark
@@ -26,10 +25,8 @@ from chauffeur.bench.openloop.nuscenes import NuScenesTables
 from chauffeur.bench.openloop.requests import question, read_context, waypoints_text
 from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.cli.main import app
-from chauffeur.concept import ConfigError, DataError, Usage
-from chauffeur.planners.base import Prose
+from chauffeur.concept import ConfigError, DataError
 
-EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
 HEAD = "Scene Number,Instruction Type,Instruction\n"
 SAYS = "The passenger says: "
 
@@ -70,21 +67,6 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (annotations / "doScenesAnnotations - Annotator 1.csv").write_text(FIRST)
     (annotations / "doScenesAnnotations - Annotator 2.csv").write_bytes(b"\xef\xbb\xbf" + SECOND.encode())
     return tmp_path / "data"
-
-
-class Scripted:
-    """Answers by a function of the last text; keeps what it was asked."""
-
-    id = model = "scripted"
-
-    def __init__(self, answer: Callable[[str], str]) -> None:
-        self.answer, self.seen = answer, list[str]()
-
-    async def write(self, messages: Sequence[Any]) -> Prose:
-        self.seen.append("\n".join(part["text"] for part in messages[0]["content"] if part["type"] == "text"))
-        content = messages[-1]["content"]
-        text = content if isinstance(content, str) else content[-1]["text"]
-        return Prose(self.answer(text), whole=True, model="scripted", usage=Usage())
 
 
 def run(data: Path, answer: Callable[[str], str], **options: Any) -> tuple[InstructedBenchmark, list[dict[str, Any]]]:
@@ -227,7 +209,9 @@ def test_the_instruction_is_all_that_differs_and_no_navigation_leaks(data: Path,
     bench = InstructedBenchmark(str(data), str(data / "Annotations"), setting=setting, limit=1)
     who = Scripted(deaf if setting == "zero-shot" else lambda text: "I think so.")
     BenchRun(data.parent / "run", bench, who).run(quiet, EFFORT)
-    opened = sorted(set(who.seen), key=len)
+    opened = sorted(
+        {"\n".join(part["text"] for part in turns[0]["content"] if "text" in part) for turns in who.seen}, key=len
+    )
     assert [told(text) for text in opened] == ["", "turn left", "turn left, at the kiosk"]
     assert {text.replace(f"{SAYS}{told(text)}\n", "") for text in opened} == {opened[0]}
     assert not any("Navigation" in text for text in opened)

@@ -47,40 +47,44 @@ def a_set(root: Path, times_s: list[float], scale: float = 1e6) -> NuScenesTable
     return NuScenesTables(root, "v1.0-mini")
 
 
-def right(samples: list[PlanningSample]) -> None:
+def right(samples: list[PlanningSample], off: float = 0.13) -> None:
     """Speeds and waypoints are those of the drive, half seconds apart."""
     assert samples
     for one in samples:
-        assert np.allclose(one.speeds_mps, SPEED_MPS, rtol=0.13)
+        assert np.allclose(one.speeds_mps, SPEED_MPS, rtol=off)
         known = one.future[np.isfinite(one.future[:, 0])]
-        assert np.allclose(known[:, 0], 2.5 * np.arange(1, len(known) + 1), rtol=0.13)
+        assert np.allclose(known[:, 0], 2.5 * np.arange(1, len(known) + 1), rtol=off)
 
 
-@pytest.mark.parametrize("rate_hz", [2.0, 4.0, 10.0, 12.0, 20.0])
-def test_other_rates_are_thinned_by_time_stamps(tmp_path: Path, rate_hz: float) -> None:
-    samples = a_set(tmp_path, [i / rate_hz for i in range(int(8 * rate_hz) + 1)]).samples()
-    right(samples)
+JITTER_S = np.random.default_rng(3).uniform(-0.05, 0.05, 17)
+"""As of nuScenes' key frames, which are the LIDAR sweeps closest to every half second."""
+
+
+@pytest.mark.parametrize(
+    ("times_s", "off"),
+    [
+        *(([i / rate_hz for i in range(int(8 * rate_hz) + 1)], 0.13) for rate_hz in (2.0, 4.0, 10.0, 12.0, 20.0)),
+        ((np.arange(17) / 2.0 + JITTER_S).tolist(), 0.25),
+    ],
+)
+def test_samples_closest_to_every_half_second_are_taken(tmp_path: Path, times_s: list[float], off: float) -> None:
+    samples = a_set(tmp_path, times_s).samples()
     assert len(samples) == 12, "17 half seconds; four before the first, one after the last"
+    right(samples, off)
 
 
-@pytest.mark.parametrize("rate_hz", [0.5, 1.0, 1.4, 3.0, 5.0])
-def test_rates_that_do_not_fit_are_refused(tmp_path: Path, rate_hz: float) -> None:
-    tables = a_set(tmp_path, [i / rate_hz for i in range(40)])
-    with pytest.raises(DataError, match=r"0\.5 s is needed"):
+@pytest.mark.parametrize(
+    ("times_s", "scale", "said"),
+    [
+        *(([i / rate_hz for i in range(40)], 1e6, r"0\.5 s is needed") for rate_hz in (0.5, 1.0, 1.4, 3.0, 5.0)),
+        *(([i / 2.0 for i in range(20)], scale, "microseconds") for scale in (1.0, 1e3, 1e9)),
+        ([0.0, 0.5, 1.0, 0.9, 2.0, 2.5], 1e6, r"sample\.json, row 'k3': 'timestamp'"),
+    ],
+)
+def test_times_that_do_not_fit_are_refused(tmp_path: Path, times_s: list[float], scale: float, said: str) -> None:
+    tables = a_set(tmp_path, times_s, scale)
+    with pytest.raises(DataError, match=said):
         tables.samples()
-
-
-@pytest.mark.parametrize("scale", [1.0, 1e3, 1e9])
-def test_other_units_of_time_are_refused(tmp_path: Path, scale: float) -> None:
-    tables = a_set(tmp_path, [i / 2.0 for i in range(20)], scale)
-    with pytest.raises(DataError, match="microseconds"):
-        tables.samples()
-
-
-def test_key_frames_that_jitter_are_at_two_hertz(tmp_path: Path) -> None:
-    jitter = np.random.default_rng(3).uniform(-0.05, 0.05, 17)
-    samples = a_set(tmp_path, (np.arange(17) / 2.0 + jitter).tolist()).samples()
-    assert len(samples) == 12
 
 
 def test_what_lies_beyond_a_gap_is_another_drive(tmp_path: Path) -> None:
@@ -88,22 +92,6 @@ def test_what_lies_beyond_a_gap_is_another_drive(tmp_path: Path) -> None:
     samples = a_set(tmp_path, times).samples()
     right(samples)
     assert len(samples) == 8 and not any(one.whole for one in samples)
-
-
-def test_time_that_runs_backwards_is_named(tmp_path: Path) -> None:
-    tables = a_set(tmp_path, [0.0, 0.5, 1.0, 0.9, 2.0, 2.5])
-    with pytest.raises(DataError, match=r"sample\.json, row 'k3': 'timestamp'"):
-        tables.samples()
-
-
-def test_samples_that_lead_in_a_circle_are_named(tmp_path: Path) -> None:
-    a_set(tmp_path, [i / 2.0 for i in range(8)])
-    path = tmp_path / "v1.0-mini" / "sample.json"
-    rows = json.loads(path.read_text())
-    rows[-1]["next"] = "k2"
-    path.write_text(json.dumps(rows))
-    with pytest.raises(DataError, match="circle"):
-        NuScenesTables(tmp_path, "v1.0-mini").samples()
 
 
 FIELDS = {
@@ -151,13 +139,24 @@ def test_a_row_that_is_not_right_is_named_by_table_token_and_field(
     assert f"{table}.json" in said and repr(field) in said and repr(rows[0]["token"]) in said
 
 
-@pytest.mark.parametrize("file", ["../../etc/passwd", "/etc/passwd", "samples/../../x.jpg"])
-def test_pictures_lie_in_the_folder_of_the_set(tmp_path: Path, file: str) -> None:
-    path = write_nuscenes(tmp_path) / "v1.0-mini" / "sample_data.json"
+@pytest.mark.parametrize(
+    ("table", "row", "field", "value", "said"),
+    [
+        *(
+            ("sample_data", 0, "filename", file, "filename")
+            for file in ("../../etc/passwd", "/etc/passwd", "samples/../../x.jpg")
+        ),
+        ("sample", -1, "next", "scene-0003-2", "circle"),
+    ],
+)
+def test_files_outside_and_circles_are_refused(
+    tmp_path: Path, table: str, row: int, field: str, value: str, said: str
+) -> None:
+    path = write_nuscenes(tmp_path) / "v1.0-mini" / f"{table}.json"
     rows = json.loads(path.read_text())
-    rows[0]["filename"] = file
+    rows[row][field] = value
     path.write_text(json.dumps(rows))
-    with pytest.raises(DataError, match="filename"):
+    with pytest.raises(DataError, match=said):
         NuScenesTables(tmp_path, "v1.0-mini").samples()
 
 

@@ -17,7 +17,7 @@ from small_run import Inline, quiet
 
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee, feasible, impossible, start_of
@@ -100,7 +100,7 @@ def test_goals_can_be_set_up() -> None:
     world = HighwayWorld()
     for wish in WISHES:
         world.reset(wish.scene)
-        make_any_goal(world.perception(), wish.scene)
+        make_goal(world.perception(), wish.scene)
 
 
 def test_impossible_wishes_are_impossible_in_their_scenes() -> None:
@@ -196,7 +196,7 @@ def _fair(wish: PassengerWish) -> str:
         return f"{wish.id}: {verdict.why}"
     world = HighwayWorld()
     world.reset(wish.scene)
-    referee = GoalReferee(world, make_any_goal(world.perception(), wish.scene))
+    referee = GoalReferee(world, make_goal(world.perception(), wish.scene))
     idle = drive_without_program(world, referee, 61.0, record=False).outcome
     return f"{wish.id}: a car that ignores it fulfils it" if idle == "success" else ""
 

@@ -9,7 +9,7 @@ import pytest
 from chauffeur.bench.lampilot.expert import expert_program, variants
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.bench.lampilot.rehearse import Crew, OriginJudge, candidates, rehearsed
+from chauffeur.bench.lampilot.rehearse import OriginJudge, candidates, rehearsed
 from chauffeur.concept import Metric, Outcome, Scenario
 from chauffeur.drive.session import drive_program
 from chauffeur.worlds.highway import HighwayWorld
@@ -108,17 +108,3 @@ def test_a_planners_own_program_is_varied_and_the_expert_stands_in_where_there_i
     texts = candidates(goal, 4, 0, "def drive():\n    set_target_speed(25.0)\n    yield autopilot()\n")
     assert len(texts) == 4
     assert all("get_left_lane" not in text for text in texts)
-
-
-@pytest.mark.slow
-def test_a_crew_chooses_as_one_process_does(lampilot_data: Path) -> None:
-    scenario = sample(lampilot_data, "inc_abs_dis65_s1")
-    texts = variants(scenario.goal, 6, seed=0)
-    world = HighwayWorld()
-    world.reset(scenario)
-    alone = rehearsed(world, scenario, texts)
-    with Crew(helpers=1) as crew:
-        together = crew.rehearsed(scenario, texts)
-    assert together.index == alone.index
-    assert together.rollouts[together.index] == alone.rollouts[alone.index]
-    assert list(together.rollouts) == list(range(6))

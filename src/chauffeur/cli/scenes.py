@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -149,8 +150,8 @@ def check(
     out: Annotated[Path | None, typer.Option(help="Write every fault as a JSON line.")] = None,
 ) -> None:
     """Drive every scene with the scripted expert, and read every instruction back."""
-    from chauffeur.bench.lampilot.scenes.scene_check import as_row, counts
     from chauffeur.bench.lampilot.scenes.scene_check import check as look_over
+    from chauffeur.bench.lampilot.scenes.scene_check import counts
     from chauffeur.cli.console import plain, stdout
     from chauffeur.drive.files import publish
 
@@ -158,7 +159,7 @@ def check(
     with progress(console, "checked") as show:
         items, faults = look_over(data, workers or os.cpu_count() or 1, show)
     if out is not None:
-        lines = "".join(json.dumps(as_row(fault), ensure_ascii=False) + "\n" for fault in faults)
+        lines = "".join(json.dumps(asdict(fault), ensure_ascii=False) + "\n" for fault in faults)
         publish(out, lines.encode(), "list of faults")
     if not faults:
         console.print(f"{items:,} items: every scene is solved by the expert, every instruction says its goal.")
@@ -177,8 +178,7 @@ def check(
 @scenes_app.command(epilog=STATS_EXAMPLES)
 def stats(data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")]) -> None:
     """The columns of Tab. III for any DbLv1 folder, next to the paper's. Extras of a suite are counted apart."""
-    from chauffeur.bench.lampilot.scenes.scene_check import folders_of
-    from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
+    from chauffeur.bench.lampilot.scenes.scene_check import folders_of, statistics_of, table
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset
 

@@ -16,7 +16,7 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
-from chauffeur.bench.lampilot.goals_more import answered_rightly
+from chauffeur.bench.lampilot.goals import answered_rightly
 from chauffeur.bench.lampilot.metrics import points, ruler_named
 from chauffeur.bench.lampilot.report import JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import Requests

@@ -1,4 +1,4 @@
-"""What a run is about, frozen in its folder before anything is asked or driven: `plan.json`.
+"""A run's plan, frozen in its folder before anything is asked or driven: `plan.json`.
 
 It holds the whole matrix, scenes and words included, so that a run folder can be scored anew, merged and looked at
 without the data set it was drawn from.
@@ -26,7 +26,7 @@ BENCH_VERSION = "lampilot-bench-v2"
 
 @dataclass(frozen=True, slots=True)
 class RunConfig:
-    """What decides a run; stored with it, and compared when it is continued.
+    """Options of a run; stored with it, and compared when it is continued.
 
     Attributes:
         planner: Planner spec, or a baseline's name.

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from chauffeur.bench.lampilot.goals import Goal, Ruling
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import Goal, Ruling, make_goal
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.signals import SignalLog, Signals
 from chauffeur.concept import Metric, Outcome, Scenario
@@ -28,7 +27,7 @@ class GoalJudge:
 
     @property
     def over(self) -> bool:
-        """Whether the goal is decided."""
+        """True once the goal is decided."""
         return self._ruling != "open"
 
     @property
@@ -43,7 +42,7 @@ class GoalJudge:
         return now.crashed or not now.on_road
 
     def outcome(self) -> Outcome:
-        """What happened, collisions apart. A goal that is never decided is a timeout: time or road ran out."""
+        """Outcome, collisions apart. A goal that is never decided is a timeout: time or road ran out."""
         return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
 
     def metrics(self) -> tuple[Metric, ...]:
@@ -56,7 +55,7 @@ class LampilotReferee(GoalJudge):
 
     def __init__(self, world: HasRoad, scenario: Scenario) -> None:
         road = world.perception()
-        super().__init__(road, make_any_goal(road, scenario))
+        super().__init__(road, make_goal(road, scenario))
         self._log = SignalLog(road)
 
     def observe(self) -> None:
@@ -66,12 +65,12 @@ class LampilotReferee(GoalJudge):
         self._ruling = self._goal.rule(self._log.steps / 10, now)
 
     def outcome(self) -> Outcome:
-        """What happened. A goal reached in the instant of a collision is a collision."""
+        """Outcome. A goal reached in the instant of a collision is a collision."""
         now = self._road.instant()
         return "collision" if now.crashed else "off_road" if not now.on_road else super().outcome()
 
     def signals(self) -> Signals:
-        """What the scores are made of, so far."""
+        """Signals for the scores, so far."""
         return self._log.signals()
 
     def metrics(self) -> tuple[Metric, ...]:

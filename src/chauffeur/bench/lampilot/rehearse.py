@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import atexit
 import math
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Mapping, Sequence
 from functools import cache
-from multiprocessing.sharedctypes import Synchronized
-from typing import Any, Self
+from typing import Any
 
 from chauffeur.bench.lampilot.expert import variants
-from chauffeur.bench.lampilot.goals import DistanceGoal, OvertakeGoal, SpeedGoal
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import HeldGoal, OvertakeGoal, make_goal
 from chauffeur.bench.lampilot.metrics import (
     ANY_STOP_M,
     COLLISION_WEIGHT,
@@ -26,10 +21,9 @@ from chauffeur.bench.lampilot.metrics import (
 )
 from chauffeur.bench.lampilot.referee import GoalJudge
 from chauffeur.concept import Scenario
-from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, rehearse, tries
+from chauffeur.drive.rehearsal import RehearsedChoice, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
-from chauffeur.programs.workers import on_core
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception
 
 MAX_TRY_S = 70.0
@@ -42,10 +36,10 @@ _EVERY_TICKS = 5
 
 
 class OriginJudge(GoalJudge):
-    """What a trip is worth under LaMPilot's own ruler, collisions included, while it is driven."""
+    """Worth of a trip under LaMPilot's own ruler, collisions included, while it is driven."""
 
     def __init__(self, road: RoadPerception, scenario: Scenario) -> None:
-        super().__init__(road, make_any_goal(road, scenario))
+        super().__init__(road, make_goal(road, scenario))
         self._steps = 0
         self._mean = self._squares = 0.0
         self._least_s = math.inf
@@ -67,7 +61,7 @@ class OriginJudge(GoalJudge):
 
     @property
     def worth(self) -> float:
-        """What the trip adds to 100 times the driving score of a run, per item."""
+        """Contribution of the trip to 100 times the driving score of a run, per item."""
         return self._score_after(self._steps, self._least_s) * self.success - COLLISION_WEIGHT * self.collided
 
     @property
@@ -80,7 +74,7 @@ class OriginJudge(GoalJudge):
         per_mps = WEIGHTS["speed_variance"] * 100.0 / SPEED_STD_FULL_MPS
         per_step = WEIGHTS["time_efficiency"] * 100.0 / (TIME_LIMIT_S * 10.0)
         best = (per_mps * math.sqrt(self._squares) / (2.0 * per_step)) ** (2.0 / 3.0)
-        left_s = self._goal.left_s(self._steps / 10) if isinstance(self._goal, SpeedGoal | DistanceGoal) else 0.0
+        left_s = self._goal.left_s(self._steps / 10) if isinstance(self._goal, HeldGoal) else 0.0
         least = self._steps + math.floor(10.0 * left_s)
         ttc_s = min(self._least_s, self._inevitable_s)
         return max(self._score_after(max(least, round_(best)), ttc_s) for round_ in (math.floor, math.ceil))
@@ -130,14 +124,15 @@ def rehearsed(
         ScenarioError: The scenario's goal cannot be judged here.
         SandboxError: No worker can be had.
     """
-    place = unhurried_sandbox() if sandbox is None else sandbox
     return rehearse(
-        world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library, stop_zone_m=ANY_STOP_M
+        world,
+        sources,
+        lambda copy: OriginJudge(copy.perception(), scenario),
+        sandbox=unhurried_sandbox() if sandbox is None else sandbox,
+        max_s=MAX_TRY_S,
+        library=library,
+        stop_zone_m=ANY_STOP_M,
     )
-
-
-def _judges(scenario: Scenario) -> Callable[[HighwayWorld], OriginJudge]:
-    return lambda copy: OriginJudge(copy.perception(), scenario)
 
 
 @cache
@@ -146,114 +141,3 @@ def unhurried_sandbox() -> Sandbox:
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox
-
-
-class Crew:
-    """Processes that rehearse one wish together, so that it has all cores. Use it as a context manager.
-
-    A benchmark run does not need it: its workers have a sample each.
-    """
-
-    def __init__(self, helpers: int | None = None) -> None:
-        """Start helper processes beside this one. Raises OSError when none can be started.
-
-        Args:
-            helpers: How many; None for one on each further core.
-        """
-        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [None]
-        if helpers is None:
-            helpers = len(cores) - 1
-        context = multiprocessing.get_context("spawn")
-        self._core = cores[0]
-        self._desk = _Desk(context.Value("i", 0), context.Value("d", -math.inf))
-        self._pools = [
-            ProcessPoolExecutor(
-                1, mp_context=context, initializer=_join, initargs=(self._desk, cores[(1 + i) % len(cores)])
-            )
-            for i in range(helpers)
-        ]
-        with on_core(self._core):  # a host and its sandbox take turns: on two cores they would wait for each other
-            self._sandbox = Sandbox(UNHURRIED)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc_info: object) -> None:
-        self._sandbox.close()
-        for pool in self._pools:
-            pool.shutdown(cancel_futures=True)
-
-    def rehearsed(self, scenario: Scenario, sources: Sequence[str], *, library: str = "") -> RehearsedChoice:
-        """As `rehearsed`, for a trip that begins where the scenario does; the choice is the same."""
-        self._desk.clear()
-        others = [pool.submit(_share, scenario, sources, library) for pool in self._pools]
-        with on_core(self._core):
-            rollouts = _tries(self._desk, scenario, sources, library, self._sandbox)
-        for other in others:
-            rollouts |= other.result()
-        return best_choice(sources, dict(sorted(rollouts.items())))
-
-
-class _Desk:
-    """What a crew shares: which candidate is next, and how good the best one was."""
-
-    def __init__(self, tickets: Synchronized[int], worth: Synchronized[float]) -> None:
-        self._tickets = tickets
-        self._worth = worth
-
-    def clear(self) -> None:
-        """A new wish."""
-        self._tickets.value = 0
-        self._worth.value = -math.inf
-
-    def places(self, count: int) -> Iterator[int]:
-        """Candidates that nobody has begun, one after the other."""
-        while True:
-            with self._tickets.get_lock():
-                place = self._tickets.value
-                self._tickets.value = place + 1
-            if place >= count:
-                return
-            yield place
-
-    @property
-    def best(self) -> float:
-        return self._worth.value
-
-    def tell(self, worth: float) -> None:
-        with self._worth.get_lock():
-            self._worth.value = max(self._worth.value, worth)
-
-
-_joined: list[_Desk] = []
-"""The desk of the crew that this process belongs to."""
-
-
-def _join(desk: _Desk, core: int | None) -> None:
-    _joined.append(desk)
-    if core is not None:
-        os.sched_setaffinity(0, {core})
-    unhurried_sandbox()
-
-
-def _share(scenario: Scenario, sources: Sequence[str], library: str) -> Mapping[int, Rollout]:
-    return _tries(_joined[0], scenario, sources, library, unhurried_sandbox())
-
-
-def _tries(
-    desk: _Desk, scenario: Scenario, sources: Sequence[str], library: str, sandbox: Sandbox
-) -> dict[int, Rollout]:
-    """What this process finds out."""
-    world = HighwayWorld()
-    world.reset(scenario)
-    return tries(
-        world,
-        sources,
-        _judges(scenario),
-        desk.places(len(sources)),
-        sandbox=sandbox,
-        max_s=MAX_TRY_S,
-        library=library,
-        stop_zone_m=ANY_STOP_M,
-        board=desk,
-    )

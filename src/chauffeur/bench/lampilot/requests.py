@@ -1,4 +1,4 @@
-"""What a planner is asked for an item: the part of a run that a learning loop replaces."""
+"""Requests to a planner, item by item: the part of a run that a learning loop replaces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a worker process does: put a sample into words, or drive a policy on it. Values in, JSON values out."""
+"""Work of a worker process: drive a policy on a sample. Values in, JSON values out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario, Setpoints
+from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.planning import checked
 from chauffeur.drive.session import drive_program, drive_without_program
@@ -85,14 +85,11 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
     shield = Shield(world.dt_s, job.limits) if job.shield else None
     if shield is not None:
         row["shield"] = SHIELD_VERSION
-    if job.baseline in ("idm", "mobil"):
-        adjust = None if job.baseline == "idm" else _mobil(world)
-        episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust, shield=shield)
-        return row | _driven(episode, referee)
+    program = None
     try:
-        if job.baseline:
+        if job.baseline == "expert":
             program = Program(expert_program(job.scenario.goal))
-        else:
+        elif not job.baseline:
             found = checked(plan_adapter.validate_python(job.plan), observation, job.limits)
             row["verdicts"] = [asdict(v) for v in found.verdicts]
             if found.refusal:
@@ -100,23 +97,56 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
                 return row | not_driven("refused", found.refusal, refused=not failed, policy_failed=failed)
             assert isinstance(found.plan.policy, Program)
             program = found.plan.policy
-        if job.rehearse:
+        if job.rehearse and program is not None:
             program, row["rehearsal"] = _rehearsed(job, world, program)
-        episode = drive_program(
-            world,
-            program.source,
-            referee,
-            MAX_EPISODE_S,
-            record=False,
-            library=program.library,
-            sandbox=_sandbox(),
-            shield=shield,
-            limits=job.limits if job.shield else None,
-            stop_zone_m=ANY_STOP_M,
-        )
+        sandbox = None if program is None else _sandbox()
+        episode = drive_policy(world, referee, job.baseline, program, shield, job.limits, sandbox=sandbox)
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
     return row | _driven(episode, referee)
+
+
+def drive_policy(
+    world: HighwayWorld,
+    referee: LampilotReferee,
+    baseline: str,
+    program: Program | None,
+    shield: Shield | None,
+    limits: Limits,
+    *,
+    record: bool = False,
+    sandbox: Sandbox | None = None,
+) -> Episode:
+    """Drive a sample from the world's present instant.
+
+    Args:
+        world: Just reset to the sample.
+        referee: Judges the drive.
+        baseline: `idm` or `mobil` where there is no program.
+        program: What drives otherwise, checked.
+        shield: Has the last word on every command; None for none.
+        limits: Bound the set-points where there is a shield.
+        record: Whether frames are kept.
+        sandbox: Where the program runs; None opens one for this drive.
+
+    Raises:
+        SandboxError: No worker can be had.
+    """
+    if program is None:
+        adjust = MobilBaseline(world.perception()).choose if baseline == "mobil" else None
+        return drive_without_program(world, referee, MAX_EPISODE_S, record=record, adjust=adjust, shield=shield)
+    return drive_program(
+        world,
+        program.source,
+        referee,
+        MAX_EPISODE_S,
+        record=record,
+        library=program.library,
+        sandbox=sandbox,
+        shield=shield,
+        limits=None if shield is None else limits,
+        stop_zone_m=ANY_STOP_M,
+    )
 
 
 def _rehearsed(job: RolloutJob, world: HighwayWorld, program: Program) -> tuple[Program, dict[str, int]]:
@@ -156,15 +186,6 @@ def _sandbox() -> Sandbox:
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox
-
-
-def _mobil(world: HighwayWorld) -> Any:
-    baseline = MobilBaseline(world.perception())
-
-    def adjust(setpoints: Setpoints) -> Setpoints:
-        return baseline.choose(setpoints)
-
-    return adjust
 
 
 def _driven(episode: Episode, referee: LampilotReferee) -> dict[str, Any]:

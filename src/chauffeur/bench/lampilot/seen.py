@@ -1,4 +1,4 @@
-"""What anybody watching a drive could say of it: speeds, lanes, gaps, stops, a crash and with whom.
+"""A drive as an onlooker sees it: speeds, lanes, gaps, stops, a crash and with whom.
 
 Everything is read off the recorded instants, so it knows nothing that the simulator keeps to itself.
 """
@@ -82,7 +82,7 @@ _ROAD_END_M = 30.0
 
 
 def watch(recorded: RecordedTrip) -> SeenCommands | None:
-    """What was seen of a drive; None when nothing was driven."""
+    """Watch a recorded drive; None if nothing was driven."""
     frames = recorded.frames
     if not frames:
         return None

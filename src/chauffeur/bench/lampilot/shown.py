@@ -1,4 +1,4 @@
-"""What a run of LaMPilot-Bench kept of an item, in words and as a drive: same policy and seed give the same trip."""
+"""An item of a stored LaMPilot-Bench run, in words and driven again: same policy and seed give the same trip."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from pydantic import ValidationError
 
 from chauffeur.bench.kernel.metrics import AnyRow
 from chauffeur.bench.kernel.pipeline import context_adapter
+from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S
-from chauffeur.bench.lampilot.metrics import ANY_STOP_M, points, ruler_named
+from chauffeur.bench.lampilot.metrics import points, ruler_named
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.report import NOTHING_DRIVEN
-from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, plan_adapter
+from chauffeur.bench.lampilot.rollout import BASELINES, drive_policy, plan_adapter
 from chauffeur.bench.report.gallery import MakeCard
 from chauffeur.bench.report.model import Card
 from chauffeur.bench.report.runs import Run
@@ -33,11 +34,10 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.episode import Episode
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.session import drive_program, drive_without_program, make_trip
+from chauffeur.drive.session import make_trip
 from chauffeur.safety.shield import Shield
-from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
+from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 
 PERIOD_S = 0.1
@@ -66,7 +66,7 @@ _CAUSES = (
 
 
 def ending_words(row: AnyRow) -> str:
-    """How an item ended, briefly: `ran out of time or road after 60.0 s`."""
+    """End of an item, briefly: `ran out of time or road after 60.0 s`."""
     text = _ENDINGS.get(str(row["outcome"]), str(row["outcome"]).replace("_", " "))
     if row["outcome"] == "success" and not row["success"]:
         text = "not counted as done"
@@ -78,7 +78,7 @@ def ending_words(row: AnyRow) -> str:
 
 
 def happened(row: AnyRow) -> tuple[str, ...]:
-    """How an item ended and why, in sentences."""
+    """End of an item and its causes, in sentences."""
     ending = ending_words(row)
     sentences = [f"{ending[0].upper()}{ending[1:]}."]
     if row["collision"] and row["outcome"] not in ("collision", "off_road"):
@@ -145,7 +145,7 @@ def _signed(value: float) -> str:
 
 
 class KeptDrive:
-    """What a run kept of its items beside the results: scenes, contexts, plans, verdicts.
+    """Files of a run beside its results: scenes, contexts, plans, verdicts.
 
     Args:
         run: The run.
@@ -168,7 +168,7 @@ class KeptDrive:
 
     @property
     def baseline(self) -> str:
-        """`idm` or `mobil`; empty for planners."""
+        """`idm`, `mobil` or `expert`; empty for planners."""
         return self._planner if self._planner in BASELINES else ""
 
     def context(self, row: AnyRow) -> Context | None:
@@ -180,11 +180,11 @@ class KeptDrive:
         return _valid(plan_adapter, (self._plans.get(str(row["item"])) or {}).get("plan"))
 
     def shielded(self, row: AnyRow) -> bool:
-        """Whether the item was driven under the run-time shield."""
+        """True if the item was driven under the run-time shield."""
         return "shield" in (self._rollouts.get(str(row.get("rollout_key", ""))) or {})
 
     def verdicts(self, row: AnyRow) -> tuple[Verdict, ...]:
-        """What the checks said of the item's plan."""
+        """Verdicts of the checks on the item's plan."""
         rollout = self._rollouts.get(str(row.get("rollout_key", ""))) or {}
         return tuple(Verdict(**verdict) for verdict in rollout.get("verdicts") or ())
 
@@ -212,11 +212,15 @@ def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[Recor
     try:
         observation = world.reset(scenario)
         referee = LampilotReferee(world, scenario)
-        episode = _drive(row, plan, world, referee, kept)
+        program = plan.policy if plan is not None and isinstance(plan.policy, Program) else None
+        if kept.baseline == "expert":
+            program = Program(expert_program(scenario.goal))
+        if program is None and not kept.baseline:
+            return None, "The run kept no program that could be driven again."
+        shield = Shield(world.dt_s, LAMPILOT_LIMITS) if kept.shielded(row) else None
+        episode = drive_policy(world, referee, kept.baseline, program, shield, LAMPILOT_LIMITS, record=True)
     except ChauffeurError as error:
         return None, f"It could not be driven again: {error}"
-    if episode is None:
-        return None, "The run kept no program that could be driven again."
     note = ""
     if (episode.outcome, episode.ticks) != (row["outcome"], row["steps"]):
         again = ending_words({"outcome": episode.outcome, "success": episode.success, "steps": episode.ticks})
@@ -229,29 +233,6 @@ def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[Recor
     made = plan or Plan(Thoughts(""), None, planner=str(row.get("planner", "")))
     trip = make_trip(request, made, kept.verdicts(row), scenario, scenario.seed, episode, "")
     return RecordedTrip(trip, episode.frames, scenario, final=episode.final), note
-
-
-def _drive(
-    row: AnyRow, plan: Plan | None, world: HighwayWorld, referee: LampilotReferee, kept: KeptDrive
-) -> Episode | None:
-    shield = Shield(world.dt_s, LAMPILOT_LIMITS) if kept.shielded(row) else None
-    if kept.baseline == "mobil":
-        adjust = MobilBaseline(world.perception()).choose
-        return drive_without_program(world, referee, MAX_EPISODE_S, adjust=adjust, shield=shield)
-    if kept.baseline:
-        return drive_without_program(world, referee, MAX_EPISODE_S, shield=shield)
-    if plan is None or not isinstance(plan.policy, Program):
-        return None
-    return drive_program(
-        world,
-        plan.policy.source,
-        referee,
-        MAX_EPISODE_S,
-        library=plan.policy.library,
-        shield=shield,
-        limits=None if shield is None else LAMPILOT_LIMITS,
-        stop_zone_m=ANY_STOP_M,
-    )
 
 
 def rescored(run: Run, ruler: str) -> Run:

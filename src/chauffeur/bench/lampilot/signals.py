@@ -1,4 +1,4 @@
-"""What a drive leaves for the scores: numbers that no ruler changes, collected once a control period.
+"""Signals of a drive for the scores: numbers that no ruler changes, collected once a control period.
 
 A rollout stores them, so that scoring it by another ruler costs no drive.
 """
@@ -24,7 +24,7 @@ _STEADY_RAD = math.radians(2.0)
 
 
 def at_fault(road: RoadPerception, now: Instant, before: Sequence[Instant]) -> Fault:
-    """Who caused the contact at `now`; `before` are the ego's earlier instants, the latest last.
+    """Cause of the contact at `now`; `before` are the ego's earlier instants, the latest last.
 
     1. With an obstacle: the ego.
     2. The ego has been standing for 1 s: struck.
@@ -53,7 +53,7 @@ def at_fault(road: RoadPerception, now: Instant, before: Sequence[Instant]) -> F
 
 
 def _nearest(road: RoadPerception, now: Instant) -> VehicleState | None:
-    """What the ego touched: the crashed vehicle or the obstacle whose centre is nearest."""
+    """Object that the ego touched: the crashed vehicle or the obstacle whose centre is nearest."""
     solid = [other for other in road.others() if other.kind == "obstacle" or other.crashed]
     return min(solid, key=lambda o: math.hypot(o.x_m - now.x_m, o.y_m - now.y_m), default=None)
 

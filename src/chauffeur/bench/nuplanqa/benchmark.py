@@ -27,13 +27,13 @@ ASKING: Final = "ask-v1"
 """Id of the wording below; figures belong to it."""
 
 Control = Literal["pictures", "blank", "text"]
-"""What a model is shown: the pictures; grey ones of the same size; none at all."""
+"""Pictures shown to a model: the real ones; grey ones of the same size; none at all."""
 
 _ASK: Final = "Answer with the letter of the right option, (a), (b), (c) or (d), and nothing else."
 
 
 def conversation(item: VqaItem, frames: Sequence[FramePath], control: Control, side_px: int) -> list[Message]:
-    """What a model is sent.
+    """Messages to the model.
 
     Args:
         item: The question.
@@ -62,7 +62,7 @@ BENCH_VERSION: Final = "nuplanqa-v1"
 Status = Literal[
     "answered", "no choice", "no answer", "no vision", "missing view", "corrupt image", "no metadata", "unknown subtask"
 ]
-"""What became of a question. `answered` and `no choice` count in the accuracy, the others are counted apart."""
+"""Outcome of a question. `answered` and `no choice` count in the accuracy, the others are counted apart."""
 
 UNKNOWN_SUBTASK: Final = "Unknown subtask"
 _BEGINNINGS: Final[Mapping[str, Status]] = {
@@ -253,7 +253,7 @@ questions about our own scenes are written by the generator that also makes the 
 
     @cached_property
     def _blind(self) -> Mapping[str, bool]:
-        """Whether the blind baseline guesses a question, by its id; empty for a set too small."""
+        """Hits of the blind baseline by question id; empty for a set too small."""
         guesses = blind_guesses(self._items)
         if guesses is None:
             return {}

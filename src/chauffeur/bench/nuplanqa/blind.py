@@ -1,4 +1,4 @@
-"""How far the words of the options alone lead: the baseline that stands beside every result.
+"""Baseline by the words of the options alone; it stands beside every result.
 
 A conditional logit (McFadden 1974) over the four options: words, pairs of words and lengths of an option, each also
 together with the subtask, give it a score, and the highest score is the guess. No picture, no question. On the

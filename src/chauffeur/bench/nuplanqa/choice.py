@@ -1,4 +1,4 @@
-"""Which option an answer in free words chooses, or why it chooses none.
+"""Reads which option an answer in free words chooses, or why it chooses none.
 
 Read in this order, the first that decides stands: an object's field (`{"answer": "b"}`, counted from 1 where it is a
 number), a ticked letter, a verdict on each option, a correction ("a... wait, b"), a stated answer ("the answer is
@@ -26,7 +26,7 @@ How = Literal["letter", "text", "ordinal", "none", "refused", "several", "unclea
 
 @dataclass(frozen=True, slots=True)
 class OptionChoice:
-    """What an answer chooses.
+    """Option chosen by an answer.
 
     Attributes:
         index: Of the option; None where none was chosen.
@@ -184,7 +184,7 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
 
 
 def _written(answer: str, options: Sequence[str]) -> OptionChoice | None:
-    """What the field of an object, or a list of one, says; None where there is neither."""
+    """Choice in the field of an object, or in a list of one; None where there is neither."""
     objects = objects_in(answer)
     judged = [one for one in objects if len(one) >= _LEAST_VERDICTS and {*LETTERS}.issuperset(map(str.lower, one))]
     if judged:
@@ -294,7 +294,7 @@ def _lettered(mark: str) -> str:
 
 
 def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> OptionChoice:
-    """What is left when no letter and no single option decides."""
+    """Choice where no letter and no single option decides."""
     if len(set(bracketed)) > 1:
         last = _letters(_BRACKETED.findall(kept.splitlines()[-1]))
         listed = len({match.group(1).lower() for match in _FRONT.finditer(kept)}) > 1
@@ -328,7 +328,7 @@ def _left_over(text: str) -> str | None:
 
 
 def _lists_all(bracketed: Sequence[str]) -> bool:
-    """Whether an answer goes through all options."""
+    """True if an answer goes through all options."""
     return len(set(bracketed)) == len(LETTERS)
 
 
@@ -348,7 +348,7 @@ def _stated(text: str) -> OptionChoice | None:
 
 
 def _leads(letter: str, bracketed: Sequence[str], text: str, end: int) -> bool:
-    """Whether a letter in front is the answer, and not the first of a list."""
+    """True if a letter in front is the answer, and not the first of a list."""
     second = re.match(rf"\s*(?:and|or|/|&)?\s*{_L}(?:[\)\].,:]|\s*$)", text[end:], re.IGNORECASE)
     if second is not None and second.group(1).lower() != letter.lower():
         return False

@@ -52,14 +52,14 @@ class FramePath:
 
     @property
     def caption(self) -> str:
-        """What a model is told of it: `CAM_F0 (front), 0.5 s ago`."""
+        """Caption for the model: `CAM_F0 (front), 0.5 s ago`."""
         when = "now" if self.ago_s == 0.0 else f"{self.ago_s:g} s ago"
         return f"{self.camera} ({VIEW_NAMES.get(self.camera, self.camera)}), {when}"
 
 
 @dataclass(frozen=True)
 class FrameSource:
-    """Where the pictures of a data set lie.
+    """Locations of a data set's pictures.
 
     Attributes:
         root: Folder below which `data_path` is.
@@ -74,7 +74,7 @@ class FrameSource:
     frames: int = FRAMES
 
     def scene_type(self, token: str) -> str:
-        """What kind of scene it is, as the metadata say; empty where they do not."""
+        """Kind of scene in the metadata; empty where they have none."""
         return str(self.metadata.get(token, {}).get("scenario") or "")
 
     def paths(self, token: str) -> tuple[FramePath, ...]:

@@ -37,7 +37,7 @@ _PLAIN: Final = frozenset(
         ("numpy._core.multiarray", "scalar"),
     }
 )
-"""What a pickle may name besides nuplan's own classes: containers and arrays, none of which runs anything."""
+"""Names allowed in a pickle besides nuplan's own classes: containers and arrays, none of which runs anything."""
 
 
 class NuplanStandIn:

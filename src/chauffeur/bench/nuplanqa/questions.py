@@ -116,7 +116,7 @@ class UnreadableItem:
 
 @dataclass(frozen=True, slots=True)
 class VqaFile:
-    """What a file holds.
+    """Content of a file.
 
     Attributes:
         items: Its questions, in its order.

@@ -18,11 +18,8 @@ from chauffeur.bench.nuplanqa.questions import SKILLS, SUBTASKS
 
 def _of(row: AnyRow) -> tuple[float, ...]:
     """Hits and questions of every subtask."""
-    return tuple(value for task in SUBTASKS for value in _hit(row, task))
-
-
-def _hit(row: AnyRow, task: str) -> tuple[float, float]:
-    return (float(row["hit"]), 1.0) if row["subtask"] == task else (0.0, 0.0)
+    hit = float(row["hit"])
+    return tuple(value for task in SUBTASKS for value in ((hit, 1.0) if row["subtask"] == task else (0.0, 0.0)))
 
 
 def _accuracies(totals: Array) -> Array:

@@ -8,7 +8,7 @@ every row beside the model.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, cast, get_args
 
@@ -50,64 +50,46 @@ _LAGGED: Final = tuple(f"lagged_{5 * (i + 1):02}" for i in range(FUTURE))
 """Columns: distance of each true waypoint from the predicted position half a second before it (`conventions`)."""
 
 
-@dataclass(frozen=True, slots=True)
-class OpenLoopRow:
-    """One frame.
-
-    Attributes:
-        item: Token of the sample.
-        scene: Frames of one hang together.
-        kind, place: Of our own sets: what happens next, and where; otherwise empty.
-        setting, shown: How it was asked, and whether the picture was the real one.
-        status: What became of it; `no answer` counts nowhere.
-        detail: Why there is none.
-        failed: More than 10 m off within the first second, or unreadable; None without an answer.
-        l2_05 ... l2_30: Distance of each waypoint from the true one, m; of an unreadable answer those of a car that
-            stays; None where the log had ended.
-        lagged_05 ... lagged_30: Distance of each true waypoint from the position predicted for half a second earlier,
-            m: what OpenEMMA's published code compares at 2 and 3 s.
-        cv_05 ... cv_30, cv_lagged_05 ... cv_lagged_30, cv_failed: The same of constant velocity.
-        answer: The model's words.
-    """
-
-    item: str
-    scene: str
-    kind: str
-    place: str
-    setting: str
-    shown: str
-    status: OpenLoopStatus
-    detail: str
-    failed: bool | None
-    l2_05: float | None
-    l2_10: float | None
-    l2_15: float | None
-    l2_20: float | None
-    l2_25: float | None
-    l2_30: float | None
-    lagged_05: float | None
-    lagged_10: float | None
-    lagged_15: float | None
-    lagged_20: float | None
-    lagged_25: float | None
-    lagged_30: float | None
-    cv_failed: bool
-    cv_05: float | None
-    cv_10: float | None
-    cv_15: float | None
-    cv_20: float | None
-    cv_25: float | None
-    cv_30: float | None
-    cv_lagged_05: float | None
-    cv_lagged_10: float | None
-    cv_lagged_15: float | None
-    cv_lagged_20: float | None
-    cv_lagged_25: float | None
-    cv_lagged_30: float | None
-    answer: str
-
-
 Whose = Literal["l2", "cv"]
+
+
+def _column(name: str, whose: Whose) -> str:
+    """A column of the model's, or the same one of constant velocity."""
+    if whose == "l2":
+        return name
+    return name.replace("l2", "cv") if name.startswith("l2") else f"cv_{name}"
+
+
+OpenLoopRow: Final[type] = make_dataclass(
+    "OpenLoopRow",
+    [
+        *((name, str) for name in ("item", "scene", "kind", "place", "setting", "shown")),
+        ("status", OpenLoopStatus),
+        ("detail", str),
+        ("failed", bool | None),
+        *((name, float | None) for name in (*_AWAY, *_LAGGED)),
+        ("cv_failed", bool),
+        *((_column(name, "cv"), float | None) for name in (*_AWAY, *_LAGGED)),
+        ("answer", str),
+    ],
+    frozen=True,
+)
+"""One frame.
+
+item: Token of the sample.
+scene: Frames of one hang together.
+kind, place: Of our own sets: what happens next, and where; otherwise empty.
+setting, shown: How it was asked, and whether the picture was the real one.
+status: What became of it; `no answer` counts nowhere.
+detail: Why there is none.
+failed: More than 10 m off within the first second, or unreadable; None without an answer.
+l2_05 ... l2_30: Distance of each waypoint from the true one, m; of an unreadable answer those of a car that stays; None
+    where the log had ended.
+lagged_05 ... lagged_30: Distance of each true waypoint from the position predicted for half a second earlier, m: what
+    OpenEMMA's published code compares at 2 and 3 s.
+cv_05 ... cv_30, cv_lagged_05 ... cv_lagged_30, cv_failed: The same of constant velocity.
+answer: The model's words.
+"""
 
 
 def errors_of(row: AnyRow, convention: Convention, whose: Whose = "l2") -> L2Errors:
@@ -119,15 +101,8 @@ def errors_of(row: AnyRow, convention: Convention, whose: Whose = "l2") -> L2Err
     )
 
 
-def _column(name: str, whose: Whose) -> str:
-    """A column of the model's, or the same one of constant velocity."""
-    if whose == "l2":
-        return name
-    return name.replace("l2", "cv") if name.startswith("l2") else f"cv_{name}"
-
-
 def failed_of(row: AnyRow, whose: Whose = "l2") -> bool | None:
-    """Whether a stored row is a failure."""
+    """True if a stored row is a failure; None without an answer."""
     return row["failed" if whose == "l2" else "cv_failed"]
 
 
@@ -228,7 +203,7 @@ TABLE_XII: Final = TableSpec(
 
 
 def distance_columns(predicted: FloatArray | None, truth: FloatArray, whose: Whose = "l2") -> dict[str, Any]:
-    """What a row stores of a prediction (6, 2), None for an unreadable one."""
+    """Columns of a prediction (6, 2); None for an unreadable one."""
     found = standing() if predicted is None else predicted
     names = [_column(name, whose) for name in (*_AWAY, *_LAGGED)]
     values = known(np.concatenate([distances(found, truth), lagging(found, truth)]))
@@ -350,12 +325,10 @@ class OpenLoopBenchmark:
         if outcome.answer is None and not outcome.error:
             return ()
         sample = outcome.item.sample
-        words = "" if outcome.answer is None else str(outcome.answer["text"])
-        predicted = None if outcome.answer is None else read_waypoints(words)
+        words, predicted, status = read_answer(outcome, FUTURE)
         own = distance_columns(predicted, sample.future)
-        status: OpenLoopStatus = "answered" if predicted is not None else "unreadable"
-        if outcome.answer is None:
-            status, own = "no answer", dict.fromkeys(own)
+        if status == "no answer":
+            own = dict.fromkeys(own)
         columns: dict[str, Any] = {
             "item": sample.id,
             "scene": sample.scene,
@@ -370,6 +343,15 @@ class OpenLoopBenchmark:
             "answer": words,
         }
         return (OpenLoopRow(**columns),)
+
+
+def read_answer(outcome: ItemOutcome[OpenLoopItem], steps: int) -> tuple[str, FloatArray | None, OpenLoopStatus]:
+    """An item's words, the waypoints (steps, 2) in them, and what became of it."""
+    if outcome.answer is None:
+        return "", None, "no answer"
+    words = str(outcome.answer["text"])
+    predicted = read_waypoints(words, steps)
+    return words, predicted, "unreadable" if predicted is None else "answered"
 
 
 def _last_text(turns: Sequence[Any]) -> str:

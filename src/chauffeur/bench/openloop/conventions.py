@@ -107,7 +107,7 @@ def errors(predicted: FloatArray, truth: FloatArray, convention: Convention) -> 
 
 
 def fails(predicted: FloatArray | None, truth: FloatArray) -> bool:
-    """Whether a prediction (6, 2) is a failure: none at all, or more than 10 m off within the first second."""
+    """True if a prediction (6, 2) is a failure: none at all, or more than 10 m off within the first second."""
     if predicted is None:
         return True
     return bool((distances(predicted, truth)[:2] > FAILS_M).any())

@@ -44,7 +44,7 @@ _MOST_LINES: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class SceneInstruction:
-    """What an annotator would tell the car in a scene.
+    """Instruction of an annotator for a scene.
 
     Attributes:
         scene: nuScenes' name of it.

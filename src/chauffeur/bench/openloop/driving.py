@@ -20,7 +20,7 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.road_graph import turn_of
-from chauffeur.worlds.base import EGO, Perception
+from chauffeur.worlds.base import EGO, World
 
 Place = Literal["town", "highway", "crossing", "lot"]
 Turn = Literal["left", "straight", "right"]
@@ -64,7 +64,7 @@ class FrameMoment:
 
 @dataclass(frozen=True, slots=True)
 class TrafficTrip:
-    """What decides a trip.
+    """Configuration of a trip.
 
     Attributes:
         name: Unique in its set.
@@ -94,6 +94,24 @@ def instants(trip: TrafficTrip) -> Iterator[FrameMoment]:
     yield from {"town": _town, "highway": _highway, "crossing": _crossing, "lot": _lot}[trip.place](trip, rng)
 
 
+def _begun(trip: TrafficTrip, name: str, drawn: dict[str, Any]) -> World:
+    """The trip's world, just reset; the drawn configuration counts where the trip names none."""
+    scenario = Scenario(trip.name, name, drawn if trip.config is None else dict(trip.config), trip.seed)
+    world = make_world(scenario)
+    world.reset(scenario)
+    return world
+
+
+def _looks(world: World, seconds: float) -> Iterator[tuple[Observation, bool]]:
+    """Instants until the world ends or the time is up, and whether each begins a half second."""
+    every = round(STEP_S / world.dt_s)
+    for tick in range(round(seconds / world.dt_s)):
+        seen = world.observe()
+        if seen.ended:
+            return
+        yield seen, tick % every == 0
+
+
 def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
     from chauffeur.worlds.town import TownWorld
 
@@ -103,10 +121,7 @@ def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
     driver = world.driver()
     wishes, inside = driver.initial_setpoints(), True
     try:
-        for tick in range(round(trip.seconds / world.dt_s)):
-            seen = world.observe()
-            if seen.ended:
-                return
+        for seen, marked in _looks(world, trip.seconds):
             lane = seen.road.get(seen.ego.lane)
             now = lane is not None and bool(lane.junction)
             if inside and not now:  # a junction lies behind: another way at the next one
@@ -115,7 +130,7 @@ def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
                 wishes = replace(wishes, turn=None)
             command = driver.command(driver.settle(wishes))
             inside = now
-            if tick % round(STEP_S / world.dt_s) == 0:
+            if marked:
                 turn, away = _next_turn(seen.road, driver.lanes_ahead(), seen.ego)
                 yield _instant(seen, COMMANDS[turn], away, driver.lanes_ahead())
             actuate(world, seen, command, None, None)
@@ -124,7 +139,7 @@ def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
 
 
 def _next_turn(road: RoadGraph, lanes: tuple[LaneId, ...], ego: VehicleState) -> tuple[Turn | Literal[""], float]:
-    """Which way the junction is crossed that the ego is in or comes to next, and how far away it is, m."""
+    """Way across the junction that the ego is in or comes to next, and the distance to it, m."""
     away = 0.0
     for i, name in enumerate(lanes):
         lane = road[name]
@@ -168,35 +183,25 @@ def _highway(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMomen
         "ego_vehicle": ego,
         "redraw_unfit": True,
     }
-    scenario = Scenario(trip.name, "highway", config if trip.config is None else dict(trip.config), trip.seed)
-    world = make_world(scenario)
-    world.reset(scenario)
+    world = _begun(trip, "highway", config)
     driver, perception = world.driver(), world.perception()
     wishes, said, until = driver.initial_setpoints(), "", 0.0
-    every = round(STEP_S / world.dt_s)
-    for tick in range(round(trip.seconds / world.dt_s)):
-        seen = world.observe()
-        if seen.ended:
-            return
-        if tick % every == 0:
+    for seen, marked in _looks(world, trip.seconds):
+        if marked:
             if seen.time_s >= until:
                 said = ""
                 if rng.random() < 0.15:
                     side = int(rng.choice((-1, 1)))
                     lane = perception.adjacent_lane(perception.lane_of(EGO), side)
-                    if lane is not None and _free(perception, lane):
+                    if lane is not None and all(
+                        one is None or abs(perception.distance_along(EGO, one)) > _CLEAR_M
+                        for one in perception.neighbours(lane)
+                    ):
                         wishes = replace(wishes, target_lane=lane)
                         said, until = ("change left", "change right")[side > 0], seen.time_s + 3.0
             yield _instant(seen, COMMANDS[said], SEES_M)
         wishes = driver.settle(wishes)
         actuate(world, seen, driver.command(wishes), None, None)
-
-
-def _free(perception: Perception, lane: LaneId) -> bool:
-    """Whether nobody is near in a lane."""
-    return all(
-        one is None or abs(perception.distance_along(EGO, one)) > _CLEAR_M for one in perception.neighbours(lane)
-    )
 
 
 def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
@@ -207,17 +212,11 @@ def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
         "cars": int(rng.integers(0, 3)),
         "walkers": int(rng.integers(0, 3)),
     }
-    scenario = Scenario(trip.name, "parking", drawn if trip.config is None else dict(trip.config), trip.seed)
-    world = make_world(scenario)
-    world.reset(scenario)
+    world = _begun(trip, "parking", drawn)
     driver = world.driver()
     wishes = driver.initial_setpoints()
-    every = round(STEP_S / world.dt_s)
-    for tick in range(round(trip.seconds / world.dt_s)):
-        seen = world.observe()
-        if seen.ended:
-            return
-        if tick % every == 0:
+    for seen, marked in _looks(world, trip.seconds):
+        if marked:
             if rng.random() < _OTHERWISE:  # to another speed, or a halt
                 wishes = replace(wishes, target_speed_mps=float(max(0.0, rng.uniform(-2.0, 6.0))))
             yield _instant(seen, COMMANDS[""], SEES_M)
@@ -226,32 +225,26 @@ def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
 
 
 _OTHERWISE: Final = 0.15
-"""How often, each half second, the driver in a lot is given another speed."""
+"""Probability, each half second, that the driver in a lot is given another speed."""
 _WAITS_S: Final = 1.0
 _CLEAR_M: Final = 25.0
+"""A lane is free to change to where no vehicle is nearer than this."""
 
 
 def _crossing(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
     cars = {"num_vehicles_left": int(rng.integers(0, 4)), "num_vehicles_right": int(rng.integers(0, 4))}
-    config = {"type": "dt-intersection-v0", **cars, "redraw_unfit": True}
-    scenario = Scenario(trip.name, "highway", config, trip.seed)
-    world = make_world(scenario)
-    world.reset(scenario)
+    world = _begun(trip, "highway", {"type": "dt-intersection-v0", **cars, "redraw_unfit": True})
     driver, perception = world.driver(), world.perception()
     turn = _TURNS[int(rng.integers(3))]
     wishes = replace(driver.initial_setpoints(), turn=turn, target_speed_mps=float(rng.uniform(8.0, 12.0)))
     stood_s = 0.0
-    every = round(STEP_S / world.dt_s)
-    for tick in range(round(trip.seconds / world.dt_s)):
-        seen = world.observe()
-        if seen.ended:
-            return
+    for seen, marked in _looks(world, trip.seconds):
         sign = perception.stop_sign_ahead(wishes.served_stops)
         stops = sign is not None and stops_at_sign(seen.ego.speed_mps, sign[1])
         stood_s = stood_s + world.dt_s if stops else 0.0
         if sign is not None and stood_s > _WAITS_S:
             wishes = replace(wishes, served_stops=wishes.served_stops | {sign[0]})
-        if tick % every == 0:
+        if marked:
             yield _instant(seen, COMMANDS[turn], SEES_M if sign is None else min(SEES_M, sign[1]))
         wishes = driver.settle(wishes)
         actuate(world, seen, driver.command(wishes), None, None)

@@ -1,4 +1,4 @@
-"""What a car's own motion says of the next three seconds: the baselines that see nothing.
+"""The next three seconds from a car's own motion: the baselines that see nothing.
 
 All arrays are as in `nuscenes.PlanningSample`: history (5, 3) and future (steps, 2), ego frame, 0.5 s apart.
 """
@@ -56,14 +56,14 @@ def constant_turn_and_acceleration(history: FloatArray, steps: int = FUTURE) -> 
 
 
 def tells_nothing(history: FloatArray) -> bool:
-    """Whether the car's motion of the last second is steady: neither braking nor bend has begun, or it stands."""
+    """True if the car's motion of the last second is steady: neither braking nor bend has begun, or it stands."""
     moved = np.hypot(*np.diff(history[:, :2], axis=0).T) / STEP_S
     turned = float(history[-1, 2] - history[-2, 2])
     return abs(float(moved[-1] - moved[-2])) < _STEADY_MPS and abs(turned) < _STEADY_RAD
 
 
 def kind_of(history: FloatArray, future: FloatArray) -> FutureKind | None:
-    """What the car does that steady motion did not tell; None for a start that comes too late to be seen coming."""
+    """Kind of future that steady motion did not tell; None for a start that comes too late to be seen coming."""
     speed = float(np.hypot(*(history[-1, :2] - history[-2, :2]))) / STEP_S
     if speed < _STANDING_MPS:
         if np.hypot(*future[-1]) < _STAYS_M:

@@ -25,6 +25,7 @@ from chauffeur.bench.openloop.driving import AXLE_M, TOWNS, UNSEEN_TOWN, FrameMo
 from chauffeur.bench.openloop.extrapolation import FutureKind, kind_of, tells_nothing
 from chauffeur.bench.openloop.nuscenes import FUTURE, HISTORY, in_frame
 from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_file, sample_token, write_tables
+from chauffeur.bench.sets import claim
 from chauffeur.camera import Camera, Conditions, Rig
 from chauffeur.concept import ConfigError, ScenarioError
 from chauffeur.drive.files import publish
@@ -48,7 +49,7 @@ SHARES: Final[Mapping[FutureKind, float]] = {
     "speeds up": 0.08,
     "goes on": 0.12,
 }
-"""What is kept of a split, at most."""
+"""Greatest share of each kind in a split."""
 PERCEPTION: Final = "perception.json"
 VIEW_RAD: Final = 1.05
 _SKIES: Final = (
@@ -61,7 +62,7 @@ _SKIES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class FramesConfig:
-    """What decides a set.
+    """Configuration of a set.
 
     Attributes:
         trips: Of the training split; the others have an eighth and a quarter.
@@ -124,7 +125,7 @@ def _axle_m(place: Place) -> float:
 
 
 def chosen(kinds: Sequence[FutureKind | None], most: int, rng: np.random.Generator) -> list[int]:
-    """Which moments of a trip are kept: of each kind at most its share of `most`; None are never kept."""
+    """Places of the moments of a trip that are kept: of each kind at most its share of `most`; None are never kept."""
     kept: list[int] = []
     for kind, share in SHARES.items():
         own = [i for i, one in enumerate(kinds) if one == kind]
@@ -135,7 +136,7 @@ def chosen(kinds: Sequence[FutureKind | None], most: int, rng: np.random.Generat
 
 @dataclass(frozen=True, slots=True)
 class _Made:
-    """What is left of a trip: poses, marks (moment, command, kind) and what is known of each marked picture."""
+    """A trip as it is stored: poses, marks (moment, command, kind) and what is known of each marked picture."""
 
     poses: list[tuple[float, float, float]]
     marks: dict[int, tuple[str, str]]
@@ -166,15 +167,14 @@ def _drive(root: Path, config: FramesConfig, trip: TrafficTrip, renderer: Render
     made = _Made(
         [(round(float(x), 4), round(float(y), 4), round(float(h), 6)) for x, y, h in poses],
         {i: (moments[i].command, str(kinds[i])) for i in kept},
-        {i: _known(moments[i]) for i in kept},
+        {
+            # lead's gap (m) and speed (m/s), way to the next halt and junction (m)
+            i: [round(value, 2) for value in (one.lead_m, one.lead_mps, one.halt_m, one.junction_m)]
+            for i, one in ((i, moments[i]) for i in kept)
+        },
     )
     publish(record, json.dumps(asdict(made)).encode(), "record of a trip")
     return made
-
-
-def _known(one: FrameMoment) -> list[float]:
-    """Lead's gap (m) and speed (m/s), way to the next halt and junction (m)."""
-    return [round(value, 2) for value in (one.lead_m, one.lead_mps, one.halt_m, one.junction_m)]
 
 
 def _render(
@@ -216,7 +216,7 @@ def make_frames(
     """
     from chauffeur.camera import make_renderer
 
-    _claim(root, config)
+    claim(root, {"made": MADE, **asdict(config)}, indent=1)
     total = sum(config.count(split) for split in splits)
     done = 0
     counts: dict[Split, Mapping[str, int]] = {}
@@ -251,16 +251,6 @@ def make_frames(
         renderer.close()
     _card(root, config, counts)
     return counts
-
-
-def _claim(root: Path, config: FramesConfig) -> None:
-    path, wanted = root / "config.json", {"made": MADE, **asdict(config), "towns": list(config.towns)}
-    if path.is_file():
-        if json.loads(path.read_text(encoding="utf-8")) != wanted:
-            raise ConfigError(f"{root} holds a set of another configuration.", hint="Choose another folder.")
-        return
-    root.mkdir(parents=True, exist_ok=True)
-    publish(path, (json.dumps(wanted, indent=1) + "\n").encode(), "configuration")
 
 
 def _card(root: Path, config: FramesConfig, counts: Mapping[Split, Mapping[str, int]]) -> None:

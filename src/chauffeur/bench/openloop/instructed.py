@@ -24,12 +24,11 @@ from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, register, share
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark, OpenLoopItem, OpenLoopStatus
+from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark, OpenLoopItem, OpenLoopStatus, read_answer
 from chauffeur.bench.openloop.conventions import distances, standing
 from chauffeur.bench.openloop.doscenes import INSTRUCTION_KINDS, SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.nuscenes import PlanningSample
-from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.concept import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ class InstructedRow:
 
 
 def _compared(row: AnyRow) -> bool:
-    """Whether a method answered with the instruction and without it: no other row is in any mean."""
+    """True if a method answered with the instruction and without it: no other row is in any mean."""
     return row["kind"] != HISTORY_ONLY and row["ade_m"] is not None and row["ade_without_m"] is not None
 
 
@@ -209,7 +208,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """What of the annotations is not asked about, in words."""
+        """Annotations that are not asked about, in words."""
         there = self.tables_read.scenes
         absent = [name for name in self._by_scene if name not in there]
         asked = {one.scene for one in self.samples}
@@ -250,12 +249,10 @@ class InstructedBenchmark(OpenLoopBenchmark):
         if outcome.answer is None and not outcome.error:
             return ()
         item, sample = outcome.item, outcome.item.sample
-        words = "" if outcome.answer is None else str(outcome.answer["text"])
-        predicted = None if outcome.answer is None else read_waypoints(words, STEPS)
-        status: OpenLoopStatus = "answered" if predicted is not None else "unreadable"
+        words, predicted, status = read_answer(outcome, STEPS)
         own = _errors(standing(STEPS) if predicted is None else predicted, sample.future)
-        if outcome.answer is None:
-            status, own = "no answer", (None, None)
+        if status == "no answer":
+            own = None, None
         model = InstructedRow(
             item=item.id,
             scene=sample.scene,
@@ -278,20 +275,8 @@ class InstructedBenchmark(OpenLoopBenchmark):
         found = [model]
         for name, predict in _WORDLESS.items() if item.instruction else ():
             ade, fde = _errors(predict(sample.history, STEPS), sample.future)
-            found.append(
-                replace(
-                    model,
-                    method=name,
-                    status="answered",
-                    status_without="answered",
-                    detail="",
-                    ade_m=ade,
-                    fde_m=fde,
-                    ade_without_m=ade,
-                    fde_without_m=fde,
-                    answer="",
-                )
-            )
+            wordless = replace(model, method=name, status="answered", detail="", ade_m=ade, fde_m=fde, answer="")
+            found.append(replace(wordless, status_without="answered", ade_without_m=ade, fde_without_m=fde))
         return found
 
     def together(self, rows: Sequence[Row]) -> Sequence[Row]:

@@ -43,7 +43,7 @@ FUTURE: Final = 6
 MOST_OFF_S: Final = 0.2
 """nuScenes' key frames are the LIDAR sweeps (20 Hz) closest to every half second, and sweeps are lost at times."""
 USUALLY_OFF_S: Final = 0.05
-"""How far the middle one of all steps of a scene at 2 Hz may be from half a second."""
+"""Deviation of a scene's median step from half a second up to which it is at 2 Hz."""
 THINNED_OFF_S: Final = 0.06
 """Half a period of 10 Hz, and a little: sets of more than 2 Hz have a sample so close to every half second."""
 CAMERA: Final = "CAM_FRONT"
@@ -62,7 +62,7 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class OpenLoopMark:
-    """What a set of our own says of a sample.
+    """Mark of a sample in a set of our own.
 
     Attributes:
         sample: Its token.
@@ -103,7 +103,7 @@ class PlanningSample:
 
     @property
     def whole(self) -> bool:
-        """Whether its future is known to the end."""
+        """True if its future is known to the end."""
         return bool(np.isfinite(self.future).all())
 
     @property
@@ -361,5 +361,5 @@ def _thinned(at_s: Sequence[float]) -> list[list[int]]:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    """Whether a JSON value is a number that makes sense as a place or a time."""
+    """True if a JSON value is a number that makes sense as a place or a time."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _MOST_STAMP

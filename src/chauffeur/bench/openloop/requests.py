@@ -1,4 +1,4 @@
-"""What a model is asked for: waypoints after a picture and the car's own motion, in three settings.
+"""Requests to a model: waypoints after a picture and the car's own motion, in three settings.
 
 zero-shot         one question.
 chain-of-thought  OpenEMMA's three questions first (the scene, the road users that matter, the driver's intent), each
@@ -47,7 +47,7 @@ _WAS: Final = "Was at (x, y, heading in degrees): "
 
 
 def context_of(sample: PlanningSample) -> str:
-    """What a model is told beside the picture: own motion over 2 s, and what the navigation says."""
+    """Text beside the picture: own motion over 2 s, and what the navigation says."""
     past = ", ".join(
         f"{(i - HISTORY) * STEP_S:.1f} s ({x:.2f}, {y:.2f}, {math.degrees(heading):.1f})"
         for i, (x, y, heading) in enumerate(sample.history)

@@ -31,7 +31,7 @@ _BREAK: Final = re.compile(
     r"\n\s{0,9}\n|[.!?]\s{1,9}[A-Z]|\b(?:from|relative|origin|was|were|instead|or|better)\b|[\])}][^\[({]*\Z",
     re.IGNORECASE,
 )
-"""What parts two lists of points: a sentence or paragraph that ends, a word that compares, the end of a list."""
+"""Separators of two lists of points: a sentence or paragraph that ends, a word that compares, the end of a list."""
 _GAP_CHARS: Final = 80
 _X, _Y = (re.compile(rf"\b{name}\b[\"'\s]{{0,4}}[:=]\s{{0,4}}({NUMBER.pattern})", re.IGNORECASE) for name in "xy")
 _MOST_M: Final = 500.0

@@ -52,7 +52,7 @@ def sample_token(scene: str, place: int) -> str:
 
 
 def picture_file(scene: str, place: int) -> str:
-    """Where its picture lies, below the root."""
+    """Path of its picture, below the root."""
     return f"samples/{CAMERA}/{sample_token(scene, place)}.jpg"
 
 

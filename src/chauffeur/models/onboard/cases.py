@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.bench.lampilot.scenes.feasible import start_of
-from chauffeur.bench.lampilot.scenes.sampling import draw_road
+from chauffeur.bench.lampilot.scenes.kinds import KINDS
 from chauffeur.concept import LAMPILOT_LIMITS, Scenario, ScenarioError, Situation
 from chauffeur.describe import describe
 from chauffeur.models.onboard.skill_judge import judge
@@ -97,7 +97,7 @@ def make_case(job: tuple[int, int]) -> dict[str, Any]:
     crossing = rng.random() < CROSSING_SHARE
     kind = CROSSING if crossing else HIGHWAYS[int(rng.integers(len(HIGHWAYS)))]
     scenario = Scenario(
-        id=f"case-{index}", world="highway", config=draw_road(kind, rng), goal={}, seed=int(rng.integers(2**31))
+        id=f"case-{index}", world="highway", config=KINDS[kind].road(rng), goal={}, seed=int(rng.integers(2**31))
     )
     world = HighwayWorld()
     start = start_of(world, scenario)

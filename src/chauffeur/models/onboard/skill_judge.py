@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee
 from chauffeur.concept import Observation, Outcome, Scenario
 from chauffeur.concept.nouns import Metric
@@ -83,7 +83,7 @@ def judge(
     start = world.reset(scenario)
     goal = lampilot_goal(steps[0]) if len(steps) == 1 else None
     if goal is not None:
-        referee: Any = GoalReferee(world, make_any_goal(world.perception(), _with(scenario, goal)))
+        referee: Any = GoalReferee(world, make_goal(world.perception(), _with(scenario, goal)))
         episode = drive_program(world, source, referee, GOAL_S, record=False, library=linked.library, sandbox=sandbox)
         return JudgingVerdict(episode.success, "" if episode.success else f"{steps[0].skill}: {episode.outcome}")
     horizon = GOAL_S if any(step.skill.startswith(("turn", "go_", "overtake", "pull")) for step in steps) else HORIZON_S

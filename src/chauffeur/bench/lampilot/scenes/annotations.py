@@ -1,4 +1,4 @@
-"""What DbLv1 has no place for, item by item, in a side file that LaMPilot itself does not open.
+"""Annotations that DbLv1 has no place for, item by item, in a side file that LaMPilot itself does not open.
 
 `annotations.jsonl` stands beside `config_list.txt`; each line is keyed by the item's id. Where it gives a `goal`, that
 is the condition the item is judged by; the `eval` mapping in the task file is LaMPilot's nearest.

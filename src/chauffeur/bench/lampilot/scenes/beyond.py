@@ -24,7 +24,7 @@ from chauffeur.bench.lampilot.scenes.wish_sampler import (
     route_wish,
     sign_mps,
 )
-from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
+from chauffeur.bench.lampilot.scenes.wishes import Named, Right, SceneWish
 from chauffeur.concept import Observation
 
 Generator = np.random.Generator
@@ -32,7 +32,7 @@ Generator = np.random.Generator
 # Hints: a wish at three levels of directness (paper Tab. VII)
 
 
-def _hint(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def hint_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     behaviour = kind.split("_", 1)[1]
     if behaviour == "overtake":
         # No side is named: on two lanes there is one.
@@ -55,7 +55,7 @@ def _change(behaviour: str, start: Observation) -> SceneWish | Unfit:
     if isinstance(lead, Unfit):
         return lead
     if behaviour == "faster":
-        # Held up by somebody, so that there is speed to be gained below the sign.
+        # Held up by a lead vehicle, so that there is speed to be gained below the sign.
         if start.ego.speed_mps > sign_mps(start) - 3.0:
             return Unfit("at the limit already")
         goal = {"type": "ChangeEval", "quantity": "speed", "change": 1}
@@ -71,7 +71,7 @@ def _change(behaviour: str, start: Observation) -> SceneWish | Unfit:
 _TURNS = {"left": "turn left", "right": "turn right", "straight": "go straight on"}
 
 
-def _steps(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def steps_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """Steps in the order of the kind's name; LaMPilot's condition is that of the last."""
     if "overtake" in kind:
         passing = overtake_wish("left_overtake", start, rng)
@@ -119,7 +119,7 @@ def _steps(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
 # Wishes to refuse, and wishes to ask back about
 
 
-def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_no_lane(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     assert start.ego.lane is not None
     side = "left" if start.road[start.ego.lane].index == 0 else "right"
     if rng.random() < 0.6:
@@ -132,7 +132,7 @@ def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> SceneWish 
     return _refused(kind, wish, f"There is no lane on the {side}.")
 
 
-def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_no_lead(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     del rng
@@ -140,7 +140,7 @@ def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> SceneWish 
     return _refused(kind, wish, "Nobody is within 100 m ahead to be overtaken.")
 
 
-def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_no_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     named = Named(whole(rng, 15, 70), "m")
@@ -155,19 +155,21 @@ def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> SceneWish |
     return _refused(kind, wish, "Nobody is within 100 m ahead to keep a gap to.")
 
 
-def _refuse_no_shoulder(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_no_shoulder(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+    """To pull over where there is no emergency lane."""
     wish = pull_over_wish(kind, start, rng)
     assert isinstance(wish, SceneWish)
     return _refused(kind, wish, "This road has no emergency lane.")
 
 
-def _refuse_no_junction(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_no_junction(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+    """A turn where no road branches off."""
     wish = route_wish(("turn_left", "turn_right")[whole(rng, 0, 1)], start, rng)
     assert isinstance(wish, SceneWish)
     return _refused(kind, wish, "There is no junction on a highway.")
 
 
-def _refuse_speed(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_speed(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """Twice the sign: beyond what any limits allow."""
     named = between(rng, 1.6 * sign_mps(start), 2.4 * sign_mps(start), "m/s")
     assert isinstance(named, Named)
@@ -175,7 +177,7 @@ def _refuse_speed(kind: str, start: Observation, rng: Generator) -> SceneWish | 
     return _refused(kind, wish, "That is far above the speed limit.")
 
 
-def _refuse_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+def refuse_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """So close that there is less than a hand's breadth, or nothing, between the bumpers."""
     lead = lead_of(start)
     if isinstance(lead, Unfit):
@@ -185,53 +187,31 @@ def _refuse_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Un
     return _refused(kind, wish, "At highway speed that gap is a crash.")
 
 
-def _refuse_sign(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
-    del start, rng
-    return _unsafe(kind, "The stop sign must be obeyed.")
+def declined(why: str, right: Right = "refuse") -> Drawer:
+    """Draws a wish that no scene makes right: to refuse, or to ask back about."""
+    origin = {"type": "ACCEvalbySpeed", "rel_speed": 0}
+
+    def draw(kind: str, start: Observation, rng: Generator) -> SceneWish:
+        del start, rng
+        return SceneWish((kind,), {"type": "RefuseEval"}, origin, kind, (), right, why)
+
+    return draw
 
 
-def _refuse_danger(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
-    del rng
+def refuse_danger(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+    """Something dangerous, worded for the road."""
     place = "junction" if start.road.junctions else "highway"
-    return replace(_unsafe(kind, "That would put people in danger."), sections=(f"{kind}_{place}",))
+    wish = declined("That would put people in danger.")(kind, start, rng)
+    return wish if isinstance(wish, Unfit) else replace(wish, sections=(f"{kind}_{place}",))
 
 
-def _unsafe(kind: str, why: str) -> SceneWish:
-    return SceneWish(
-        (kind,), {"type": "RefuseEval"}, {"type": "ACCEvalbySpeed", "rel_speed": 0}, kind, (), "refuse", why
-    )
-
-
-def _ask_side(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
-    del start, rng
-    return replace(_unsafe(kind, "Both sides have a lane, and none was named."), right="ask")
-
-
-def _ask_amount(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
-    del start
+def ask_amount(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
+    """A number without what it counts."""
     number = str(whole(rng, 15, 60))
-    why = "It is not said of what: speed or distance."
-    return replace(_unsafe(kind, why), right="ask", slots=(("n", number),))
+    wish = declined("It is not said of what: speed or distance.", "ask")(kind, start, rng)
+    return wish if isinstance(wish, Unfit) else replace(wish, slots=(("n", number),))
 
 
 def _refused(kind: str, wish: SceneWish, why: str) -> SceneWish:
     """The words of a wish of the original's kinds, in a scene or with a number that make it one to refuse."""
     return replace(wish, goal={"type": "RefuseEval"}, stem=kind, right="refuse", why=why)
-
-
-WISHES: tuple[tuple[tuple[str, ...], Drawer], ...] = (
-    (("hint",), _hint),
-    (("steps",), _steps),
-    (("refuse_no_lane",), _refuse_no_lane),
-    (("refuse_no_lead",), _refuse_no_lead),
-    (("refuse_no_gap",), _refuse_no_gap),
-    (("refuse_no_shoulder",), _refuse_no_shoulder),
-    (("refuse_no_junction",), _refuse_no_junction),
-    (("refuse_speed",), _refuse_speed),
-    (("refuse_gap",), _refuse_gap),
-    (("refuse_sign",), _refuse_sign),
-    (("refuse_danger",), _refuse_danger),
-    (("ask_side",), _ask_side),
-    (("ask_amount",), _ask_amount),
-)
-"""Who draws the wish of a kind, by the beginning of its name."""

@@ -1,18 +1,17 @@
-"""Whether a scene can be driven as wished: not spoilt at the start, not fulfilled by itself, solved by the expert."""
+"""Feasibility of a scene: not spoilt at the start, not fulfilled by itself, solved by the expert."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal
-from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, make_goal
 from chauffeur.bench.lampilot.referee import GoalJudge
+from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
 from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
 from chauffeur.drive.session import drive_program, drive_without_program
-from chauffeur.geometry import LaneId
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.network import lane_id
 
@@ -24,7 +23,7 @@ _EMPTY_WISHES = ("ACCEvalbySpeed", "ACCEvalbyDistance", "ChangeEval")
 
 @dataclass(frozen=True, slots=True)
 class FeasibilityVerdict:
-    """Whether a scene is feasible.
+    """Verdict on a scene.
 
     Attributes:
         feasible: The expert solves it without a collision, and it asks for something.
@@ -56,7 +55,7 @@ class GoalReferee(GoalJudge):
 
     @property
     def success(self) -> bool:
-        """Whether the goal is reached and nothing was hit in that instant."""
+        """True if the goal is reached and nothing was hit in that instant."""
         return self._ruling == "success" and not self._crashed
 
 
@@ -68,14 +67,10 @@ def start_of(world: HighwayWorld, scenario: Scenario) -> Observation | str:
         return "the road cannot be set up"
     if start.ego.crashed or start.off_road or start.ended:
         return "starts in a crash"
-    if start.ego.lane is None or not _in_start_lane(scenario, start.ego.lane):
+    ego = scenario.config.get("ego_vehicle")
+    if start.ego.lane is None or (ego is not None and lane_id(ego["start_lane_index"]) != start.ego.lane):
         return "starts in another lane"
     return start
-
-
-def _in_start_lane(scenario: Scenario, lane: LaneId) -> bool:
-    ego = scenario.config.get("ego_vehicle")
-    return ego is None or lane_id(ego["start_lane_index"]) == lane
 
 
 def feasible(scenario: Scenario) -> FeasibilityVerdict:
@@ -89,14 +84,16 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
     if isinstance(start, str):
         return FeasibilityVerdict(False, start)
     try:
-        goal = make_any_goal(world.perception(), scenario)
+        goal = make_goal(world.perception(), scenario)
     except ScenarioError as error:
         return FeasibilityVerdict(False, error.message)
     programs = programs_for(scenario.goal, describe(start).situation)
     if not programs:
         return FeasibilityVerdict(False, "the expert has no program for it")
-    if _fulfilled_by_itself(world, scenario, goal):
-        return FeasibilityVerdict(False, "fulfilled without doing anything")
+    if scenario.goal["type"] in _EMPTY_WISHES:
+        idle = drive_without_program(world, GoalReferee(world, goal), GIVE_UP_S + 1.0, record=False)
+        if idle.outcome == "success":
+            return FeasibilityVerdict(False, "fulfilled without doing anything")
     why = ""
     for attempt in programs:
         world.reset(scenario)
@@ -106,17 +103,9 @@ def feasible(scenario: Scenario) -> FeasibilityVerdict:
     return FeasibilityVerdict(False, why)
 
 
-def _fulfilled_by_itself(world: HighwayWorld, scenario: Scenario, goal: Goal) -> bool:
-    """Whether a car that ignores the wish fulfils it; the world has just been reset."""
-    if scenario.goal["type"] not in _EMPTY_WISHES:
-        return False
-    referee = GoalReferee(world, goal)
-    return drive_without_program(world, referee, GIVE_UP_S + 1.0, record=False).outcome == "success"
-
-
 def _drive(world: HighwayWorld, scenario: Scenario, source: str) -> tuple[bool, str, int]:
-    referee = GoalReferee(world, make_any_goal(world.perception(), scenario))
-    episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False)
+    referee = GoalReferee(world, make_goal(world.perception(), scenario))
+    episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False, sandbox=unhurried_sandbox())
     if episode.causes.infra_failed:
         raise SandboxError(f"The sandbox failed in scene {scenario.id!r}: {episode.causes.detail}", retryable=True)
     if episode.causes.policy_failed:
@@ -135,7 +124,7 @@ _WORDS = {
 
 
 def impossible(scenario: Scenario, wish: dict[str, Any]) -> bool:
-    """Whether the world itself says that a wish cannot be judged in a scene: no such lane, nobody ahead, no shoulder.
+    """True if the world itself cannot judge a wish in a scene: no such lane, no lead vehicle, no shoulder.
 
     Raises:
         ScenarioError: The scene cannot be set up.
@@ -144,7 +133,7 @@ def impossible(scenario: Scenario, wish: dict[str, Any]) -> bool:
     wanted = replace(scenario, goal=wish)
     world.reset(wanted)
     try:
-        make_any_goal(world.perception(), wanted)
+        make_goal(world.perception(), wanted)
     except ScenarioError:
         return True
     return False

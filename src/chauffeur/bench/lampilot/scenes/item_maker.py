@@ -8,28 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.scenes import beyond, wish_sampler
 from chauffeur.bench.lampilot.scenes.feasible import FeasibilityVerdict, feasible, impossible, start_of
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, Slot
-from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.bench.lampilot.scenes.wish_sampler import Unfit
 from chauffeur.bench.lampilot.scenes.wishes import SceneWish
 from chauffeur.bench.lampilot.scenes.wording import Candidates, word
-from chauffeur.concept import Observation, Scenario, ScenarioError
+from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 
 MAX_DRAWS = 400
 """Draws after which an item is given up: a kind that fails so often has a fault of its own."""
 _WORDS_KEY = 1_000_000
 """Spawn key of the stream that words are drawn from; scenes are drawn from keys 0, 1, 2, ..."""
-
-
-def draw_wish(kind: str, start: Observation, rng: np.random.Generator) -> SceneWish | Unfit:
-    """A wish that fits the first instant of a drawn road, or why none does. KeyError for an unknown kind."""
-    for names, drawer in (*wish_sampler.WISHES, *beyond.WISHES):
-        if kind.startswith(names):
-            return drawer(kind, start, rng)
-    raise KeyError(kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,31 +38,35 @@ class Job:
 def make_item(job: Job) -> dict[str, Any]:
     """Draw until a scene is feasible, then word it; a row keyed by `index`.
 
-    Everything random comes from `SeedSequence([seed, index])`, so an item is the same whoever makes it and when.
+    Everything random comes from `SeedSequence([seed, index])`, so an item does not depend on the worker or the time.
 
     Raises:
         ScenarioError: No feasible scene came up.
     """
-    slot = job.slot
+    slot, kind = job.slot, KINDS[job.slot.kind]
     rejected: Counter[str] = Counter()
     for draw in range(MAX_DRAWS):
         rng = _stream(job, draw)
-        env = draw_road(slot.kind, rng)
+        env = kind.road(rng)
         traffic = int(rng.integers(2**31))
         scenario = Scenario(f"{slot.kind}_{slot.index}", "highway", env, traffic)
         start = start_of(HighwayWorld(), scenario)
         if isinstance(start, str):
             rejected[start] += 1
             continue
-        wish = draw_wish(slot.kind, start, rng)
+        wish = kind.wish(slot.kind, start, rng)
         if isinstance(wish, Unfit):
             rejected[wish.why] += 1
             continue
-        verdict = _judge(scenario, wish)
+        verdict = FeasibilityVerdict(True)
+        if wish.right == "drive":
+            verdict = feasible(replace(scenario, goal=wish.goal))
+        elif "_no_" in slot.kind and not impossible(scenario, wish.origin):
+            verdict = FeasibilityVerdict(False, "the wish is possible here")
         if verdict.why:
             rejected[verdict.why] += 1
             continue
-        candidates = word(wish, KINDS[slot.kind], slot, _stream(job, _WORDS_KEY))
+        candidates = word(wish, kind, slot, _stream(job, _WORDS_KEY))
         return _row(slot, scenario, wish, candidates, verdict, rejected)
     most = ", ".join(f"{why} ({times})" for why, times in rejected.most_common(3))
     raise ScenarioError(
@@ -83,15 +77,6 @@ def make_item(job: Job) -> dict[str, Any]:
 
 def _stream(job: Job, key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence([job.seed, job.slot.index], spawn_key=(key,)))
-
-
-def _judge(scenario: Scenario, wish: SceneWish) -> FeasibilityVerdict:
-    """Whether a scene does for a wish."""
-    if wish.right == "drive":
-        return feasible(replace(scenario, goal=wish.goal))
-    if "_no_" in scenario.id and not impossible(scenario, wish.origin):
-        return FeasibilityVerdict(False, "the wish is possible here")
-    return FeasibilityVerdict(True)
 
 
 def _row(

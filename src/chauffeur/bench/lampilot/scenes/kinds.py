@@ -1,13 +1,16 @@
-"""What a suite is made of: kinds of scenes, how many of each, and which split each item belongs to (paper Tab. III)."""
+"""Plan of a suite: kinds of scenes, how many of each, and which split each item belongs to (paper Tab. III)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from chauffeur.bench.lampilot.scenes import beyond
+from chauffeur.bench.lampilot.scenes import sampling as roads
+from chauffeur.bench.lampilot.scenes import wish_sampler as wishes
 from chauffeur.concept import ConfigError
 
 Split = Literal["train", "val", "test", "extras"]
@@ -37,65 +40,84 @@ class Kind:
         name: Also the beginning of its task files, by which families are told.
         family: Family of Tab. III, or the part of the extras.
         words: Mean instruction length wished, from LaMPilot's development items of the same kind.
+        road: Draws its road and traffic: a DbLv1 `env` mapping.
+        wish: Draws a wish that fits the first instant of such a road, or says why none does.
     """
 
     name: str
     family: str
     words: float
+    road: Callable[[np.random.Generator], roads.Env]
+    wish: wishes.Drawer
 
 
 MAIN: tuple[Kind, ...] = (
-    Kind("dec_abs_dis", "distance", 6.6),
-    Kind("inc_abs_dis", "distance", 6.6),
-    Kind("dec_rel_dis", "distance", 7.0),
-    Kind("inc_rel_dis", "distance", 6.9),
-    Kind("dec_abs_speed", "speed", 8.4),
-    Kind("inc_abs_speed", "speed", 8.7),
-    Kind("dec_rel_speed", "speed", 8.2),
-    Kind("inc_rel_speed", "speed", 8.2),
-    Kind("left_lc", "lane change", 4.8),
-    Kind("right_lc", "lane change", 4.8),
-    Kind("left_overtake", "overtake", 9.4),
-    Kind("right_overtake", "overtake", 9.9),
-    Kind("pull_over", "pull over", 12.2),
-    Kind("go_straight", "routing", 7.4),
-    Kind("turn_left", "routing", 7.2),
-    Kind("turn_right", "routing", 7.0),
+    Kind("dec_abs_dis", "distance", 6.6, roads.dense, wishes.distance_wish),
+    Kind("inc_abs_dis", "distance", 6.6, roads.near_lead, wishes.distance_wish),
+    Kind("dec_rel_dis", "distance", 7.0, roads.dense, wishes.distance_wish),
+    Kind("inc_rel_dis", "distance", 6.9, roads.near_lead, wishes.distance_wish),
+    Kind("dec_abs_speed", "speed", 8.4, roads.cruising, wishes.speed_wish),
+    Kind("inc_abs_speed", "speed", 8.7, roads.cruising, wishes.speed_wish),
+    Kind("dec_rel_speed", "speed", 8.2, roads.cruising, wishes.speed_wish),
+    Kind("inc_rel_speed", "speed", 8.2, roads.cruising, wishes.speed_wish),
+    Kind("left_lc", "lane change", 4.8, roads.right_lane, wishes.lane_wish),
+    Kind("right_lc", "lane change", 4.8, roads.left_lane, wishes.lane_wish),
+    Kind("left_overtake", "overtake", 9.4, roads.right_lane_behind_lead, wishes.overtake_wish),
+    Kind("right_overtake", "overtake", 9.9, roads.left_lane_behind_lead, wishes.overtake_wish),
+    Kind("pull_over", "pull over", 12.2, roads.shoulder, wishes.pull_over_wish),
+    Kind("go_straight", "routing", 7.4, roads.crossing, wishes.route_wish),
+    Kind("turn_left", "routing", 7.2, roads.crossing, wishes.route_wish),
+    Kind("turn_right", "routing", 7.0, roads.crossing, wishes.route_wish),
 )
 
 EXTRA_SHARES: Mapping[str, int] = {"directness": 6, "steps": 4, "refusals": 5, "units": 5}
-"""How the extras divide into parts."""
+"""Shares of the parts among the extras."""
 
-_BEHAVIOURS = ("faster", "slower", "wider", "overtake", "pull_over")
+_BEHAVIOURS = {
+    "faster": roads.dense,
+    "slower": roads.cruising,
+    "wider": roads.dense,
+    "overtake": roads.dense,
+    "pull_over": roads.shoulder,
+}
 _UNITS = {"distance": ("ft", "yd", "len"), "speed": ("kmh", "mph")}
 
 EXTRAS: Mapping[str, tuple[Kind, ...]] = {
     # Levels and behaviours turn at different rates, so that a few items show some of each.
-    "directness": tuple(Kind(f"hint{1 + i % 3}_{_BEHAVIOURS[i % 5]}", "directness", 8.0) for i in range(15)),
+    "directness": tuple(
+        Kind(f"hint{1 + i % 3}_{name}", "directness", 8.0, road, beyond.hint_wish)
+        for i, (name, road) in enumerate(3 * tuple(_BEHAVIOURS.items()))
+    ),
     "steps": (
-        Kind("steps_overtake_pull_over", "steps", 10.0),
-        Kind("steps_overtake_return", "steps", 11.0),
-        Kind("steps_lane_speed", "steps", 12.0),
-        Kind("steps_speed_lane", "steps", 12.0),
-        Kind("steps_gap_overtake", "steps", 12.0),
-        Kind("steps_speed_turn", "steps", 12.0),
-        Kind("steps_overtake_return_speed", "steps", 15.0),
+        Kind("steps_overtake_pull_over", "steps", 10.0, roads.shoulder_behind_traffic, beyond.steps_wish),
+        Kind("steps_overtake_return", "steps", 11.0, roads.dense, beyond.steps_wish),
+        Kind("steps_lane_speed", "steps", 12.0, roads.right_lane, beyond.steps_wish),
+        Kind("steps_speed_lane", "steps", 12.0, roads.right_lane, beyond.steps_wish),
+        Kind("steps_gap_overtake", "steps", 12.0, roads.dense, beyond.steps_wish),
+        Kind("steps_speed_turn", "steps", 12.0, roads.crossing, beyond.steps_wish),
+        Kind("steps_overtake_return_speed", "steps", 15.0, roads.dense, beyond.steps_wish),
     ),
     "refusals": (
-        Kind("refuse_no_lane", "refusals", 5.5),
-        Kind("refuse_no_lead", "refusals", 8.0),
-        Kind("refuse_no_gap", "refusals", 7.5),
-        Kind("refuse_no_shoulder", "refusals", 11.0),
-        Kind("refuse_no_junction", "refusals", 7.5),
-        Kind("refuse_speed", "refusals", 7.5),
-        Kind("refuse_gap", "refusals", 7.0),
-        Kind("refuse_sign", "refusals", 7.5),
-        Kind("refuse_danger", "refusals", 7.5),
-        Kind("ask_side", "refusals", 5.0),
-        Kind("ask_amount", "refusals", 5.0),
+        Kind("refuse_no_lane", "refusals", 5.5, roads.edge_lane, beyond.refuse_no_lane),
+        Kind("refuse_no_lead", "refusals", 8.0, roads.cruising, beyond.refuse_no_lead),
+        Kind("refuse_no_gap", "refusals", 7.5, roads.cruising, beyond.refuse_no_gap),
+        Kind("refuse_no_shoulder", "refusals", 11.0, roads.dense, beyond.refuse_no_shoulder),
+        Kind("refuse_no_junction", "refusals", 7.5, roads.dense, beyond.refuse_no_junction),
+        Kind("refuse_speed", "refusals", 7.5, roads.cruising, beyond.refuse_speed),
+        Kind("refuse_gap", "refusals", 7.0, roads.dense, beyond.refuse_gap),
+        Kind("refuse_sign", "refusals", 7.5, roads.crossing, beyond.declined("The stop sign must be obeyed.")),
+        Kind("refuse_danger", "refusals", 7.5, roads.any_road, beyond.refuse_danger),
+        Kind(
+            "ask_side",
+            "refusals",
+            5.0,
+            roads.middle_lane,
+            beyond.declined("Both sides have a lane, and none was named.", "ask"),
+        ),
+        Kind("ask_amount", "refusals", 5.0, roads.cruising, beyond.ask_amount),
     ),
     "units": tuple(
-        Kind(f"{kind.name}_{units[turn]}", "units", kind.words)
+        replace(kind, name=f"{kind.name}_{units[turn]}", family="units")
         for turn in range(3)
         for kind in MAIN[:8]
         if turn < len(units := _UNITS[kind.family])

@@ -10,21 +10,22 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.lampilot.families import FAMILIES, family_of
 from chauffeur.bench.lampilot.scenes.annotations import Annotation, annotated
 from chauffeur.bench.lampilot.scenes.feasible import feasible, start_of
-from chauffeur.bench.lampilot.scenes.job_pool import Progress, spread
-from chauffeur.bench.lampilot.scenes.unambiguous import fault_of_goal
-from chauffeur.bench.lampilot.scenes.wording_choice import normal
+from chauffeur.bench.lampilot.scenes.kinds import PAPER_FAMILIES, PAPER_ITEMS, PAPER_ROADS, PAPER_WORDS
+from chauffeur.bench.lampilot.scenes.unambiguous import fault_of_goal, words_of
+from chauffeur.bench.lampilot.scenes.wording_choice import form_of, normal
+from chauffeur.bench.sets import Progress, spread
 from chauffeur.concept import DataError, Scenario
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 _SPLITS = ("train", "val", "test")
 MOST_SAID = 2
-"""How often a sentence may come in a folder whose items have words of their own."""
+"""Repetitions of a sentence allowed in a folder whose items have words of their own."""
 _NO_READING = ("SequenceEval", "ChangeEval", "RefuseEval")
 """Goals whose words are not read back: several things, hints, and wishes to refuse."""
 
@@ -97,7 +98,7 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
     faults: list[Fault] = []
     readings: dict[tuple[str, str, int], str] = {}
     for item in dataset.items():
-        if item.scenario.goal.get("type") in _NO_READING or _is_hint(notes.get(item.id)):
+        if item.scenario.goal.get("type") in _NO_READING or ((note := notes.get(item.id)) and note.directness):
             continue
         change = changes.get(item.scenario.id, 0)
         key = item.command, str(item.scenario.goal), change
@@ -116,12 +117,8 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
     return faults
 
 
-def _is_hint(note: Annotation | None) -> bool:
-    return note is not None and note.directness > 0
-
-
 def _scenes(scenes: Mapping[str, Scenario], workers: int, progress: Progress) -> tuple[list[Fault], Mapping[str, int]]:
-    """What is wrong with scenes, in their order, and which change (+1, -1) each asks for where it names a number."""
+    """Faults of scenes, in their order, and the change (+1, -1) each asks for where it names a number."""
     rows: dict[str, Row] = {}
     progress(0, len(scenes))
 
@@ -153,6 +150,78 @@ def counts(faults: Sequence[Fault]) -> list[tuple[str, str, int]]:
     return [(what, why, times) for (what, why), times in held.most_common()]
 
 
-def as_row(fault: Fault) -> dict[str, Any]:
-    """A fault as JSON."""
-    return {"what": fault.what, "where": fault.where, "why": fault.why, "text": fault.text}
+@dataclass(frozen=True, slots=True)
+class SceneStatistics:
+    """Counts of Tab. III, and how much sentences repeat.
+
+    Attributes:
+        items: Number of items.
+        scenes: Number of different samples.
+        families: Items per family; `other` for what is not LaMPilot's.
+        roads: Items per road, `highway` and `intersection`.
+        words: Least, mean and greatest instruction length.
+        sentences: Number of different instructions.
+        forms: Number of different instructions when numbers are masked.
+        most_repeated: How often the most repeated of these forms comes.
+    """
+
+    items: int
+    scenes: int
+    families: dict[str, int]
+    roads: dict[str, int]
+    words: tuple[int, float, int]
+    sentences: int
+    forms: int
+    most_repeated: int
+
+
+def statistics_of(datasets: Sequence[Dataset]) -> SceneStatistics:
+    """Statistics over data sets together (the splits of a suite)."""
+    items = [item for dataset in datasets for item in dataset.items()]
+    families = Counter(family_of(item.task) for item in items)
+    roads = Counter(
+        "intersection" if item.scenario.config.get("type") == "dt-intersection-v0" else "highway" for item in items
+    )
+    lengths = [words_of(item.command) for item in items]
+    forms = Counter(form_of(item.command) for item in items)
+    return SceneStatistics(
+        items=len(items),
+        scenes=len({item.scenario.id for item in items}),
+        families={family: families[family] for family in (*FAMILIES, "other") if families[family]},
+        roads=dict(sorted(roads.items())),
+        words=(min(lengths, default=0), sum(lengths) / max(1, len(lengths)), max(lengths, default=0)),
+        sentences=len({normal(item.command) for item in items}),
+        forms=len(forms),
+        most_repeated=max(forms.values(), default=0),
+    )
+
+
+def table(ours: SceneStatistics) -> list[tuple[str, str, str]]:
+    """Rows of Tab. III: name, here, paper."""
+
+    def share(count: int, total: int) -> str:
+        return f"{count:,} ({count / total:.1%})" if total else "0"
+
+    rows = [("Total scenarios", share(ours.items, ours.items), share(PAPER_ITEMS, PAPER_ITEMS))]
+    rows += [
+        (family.capitalize(), share(ours.families.get(family, 0), ours.items), share(count, PAPER_ITEMS))
+        for family, count in PAPER_FAMILIES.items()
+    ]
+    if ours.families.get("other"):
+        rows.append(("Other", share(ours.families["other"], ours.items), "-"))
+    rows += [
+        (road.capitalize(), share(ours.roads.get(road, 0), ours.items), share(count, PAPER_ITEMS))
+        for road, count in PAPER_ROADS.items()
+    ]
+    names = ("Minimum", "Average", "Maximum")
+    rows += [
+        (f"{name} instruction length, words", f"{value:.1f}" if name == "Average" else f"{value:.0f}", f"{paper:g}")
+        for name, value, paper in zip(names, ours.words, PAPER_WORDS, strict=True)
+    ]
+    rows += [
+        ("Different scenes", f"{ours.scenes:,}", "490"),
+        ("Different instructions", f"{ours.sentences:,}", "-"),
+        ("Different instructions, numbers masked", f"{ours.forms:,}", "-"),
+        ("Most repeated of these", f"{ours.most_repeated:,}", "-"),
+    ]
+    return rows

@@ -17,7 +17,7 @@ from chauffeur.planners.onboard.personal import Leaning
 
 EXEMPLARS = "onboard-exemplars-v1"
 SOLVERS = (EXPERT, EXEMPLARS)
-"""Who proves scenes feasible, in the order in which they try."""
+"""Solvers that prove scenes feasible, in the order in which they try."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _ways(goal: dict[str, Any]) -> list[tuple[Meaning, ...]]:
         return []
     ways = [(meaning,)]
     if goal["type"] == "ChangeEval" and meaning.manoeuvre == "speed" and meaning.change > 0:
-        # Held up by somebody: closing up, or getting past.
+        # Held up by a lead vehicle: closing up, or getting past.
         ways += [(Meaning("style", variant="hurry"),), (Meaning("overtake"),)]
     if goal["type"] == "OvertakeEval":
         ways.append((replace(meaning, manner="swift"),))

@@ -18,12 +18,12 @@ from typing import Any
 from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot.scenes.annotations import FILE
 from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
-from chauffeur.bench.lampilot.scenes.job_pool import Progress, spread
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, plan_suite
+from chauffeur.bench.lampilot.scenes.scene_check import statistics_of
 from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
-from chauffeur.bench.lampilot.scenes.statistics import statistics_of
 from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, normal
 from chauffeur.bench.lampilot.scenes.writer import SceneItem, folder_of, items_of, write_folder
+from chauffeur.bench.sets import Progress, claim, spread
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld
@@ -32,10 +32,10 @@ from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 _SPLITS = ("train", "val", "test")
 
 
-def manifest_of(
+def contents_of(
     rows: Sequence[Mapping[str, Any]], items: Sequence[SceneItem], datasets: Mapping[str, Dataset]
 ) -> dict[str, Any]:
-    """Manifest of a written suite.
+    """Part of the manifest that is counted in the suite as it was written.
 
     Args:
         rows: Made items, in the order of the plan.
@@ -44,8 +44,6 @@ def manifest_of(
     """
     main = [datasets[name] for name in _SPLITS if name in datasets]
     return {
-        "versions": {name: version(name) for name in ("chauffeur", "numpy")},
-        "engine": HighwayWorld.engine,
         "items": {name: len(dataset.items()) for name, dataset in datasets.items()},
         "statistics": asdict(statistics_of(main)),
         "phrasing": dict(sorted(Counter(item.note.phrasing or "extras" for item in items).items())),
@@ -65,27 +63,20 @@ def manifest_of(
 
 def _scenes(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Draws and rejections: of the main suite, of the extras, and by kind."""
-    main = {kind.name for kind in MAIN}
-    by_kind: dict[str, Counter[str]] = {}
-    kept: Counter[str] = Counter(row["kind"] for row in rows)
-    for row in rows:
-        by_kind.setdefault(row["kind"], Counter()).update(row["rejected"])
-    total: Counter[str] = Counter()
-    for kind, why in by_kind.items():
-        if kind in main:
-            total.update(why)
+    names = {kind.name for kind in MAIN}
+    main = [row for row in rows if row["kind"] in names]
+    solvers = Counter(row["solved_by"] for row in main)
+    kinds = dict.fromkeys(row["kind"] for row in rows)
     return {
-        "main": {
-            "kept": sum(kept[kind] for kind in main),
-            "drawn": sum(kept[kind] for kind in main) + total.total(),
-            "rejected": dict(total.most_common()),
-            "solved_by": dict(Counter(row["solved_by"] for row in rows if row["kind"] in main).most_common()),
-        },
-        "by_kind": {
-            kind: {"kept": kept[kind], "drawn": kept[kind] + why.total(), "rejected": dict(why.most_common())}
-            for kind, why in by_kind.items()
-        },
+        "main": {**_drawn(main), "solved_by": dict(solvers.most_common())},
+        "by_kind": {kind: _drawn([row for row in rows if row["kind"] == kind]) for kind in kinds},
     }
+
+
+def _drawn(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Numbers of scenes kept and drawn, and reasons for rejecting the others."""
+    why = sum((Counter(row["rejected"]) for row in rows), Counter[str]())
+    return {"kept": len(rows), "drawn": len(rows) + why.total(), "rejected": dict(why.most_common())}
 
 
 def _words(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -151,32 +142,17 @@ class Suite:
         self.config = config
         self.slots = plan_suite(config.n, config.seed, config.extras)
         self._avoid: Set[str] = frozenset() if avoid is None else {normal(item.command) for item in avoid.items()}
-        self._freeze_plan()
-        self._rows = RowStore(folder / "scenes.jsonl", "index")
-
-    def _freeze_plan(self) -> None:
-        plan = {
+        self._about: dict[str, Any] = {
             "generator": GENERATOR,
             "solvers": list(SOLVERS),
-            "config": asdict(self.config),
+            "config": asdict(config),
             "versions": {name: version(name) for name in ("chauffeur", "numpy")},
             "engine": HighwayWorld.engine,
         }
-        path = self.folder / PLAN
-        if path.exists():
-            try:
-                begun = json.loads(path.read_text(encoding="utf-8"))
-            except ValueError:
-                begun = None
-            if begun != plan:
-                raise ConfigError(
-                    f"{self.folder} holds a suite with other options or of another version.",
-                    hint="Continue it with the options it was started with, or choose another --out folder.",
-                )
-            return
-        if self.folder.exists() and any(self.folder.iterdir()):
-            raise ConfigError(f"{self.folder} is not empty and holds no suite.", hint="Choose another --out folder.")
-        publish(path, json.dumps(plan, indent=1).encode(), "suite's plan")
+        if not (folder / PLAN).exists() and folder.exists() and any(folder.iterdir()):
+            raise ConfigError(f"{folder} is not empty and holds no suite.", hint="Choose another --out folder.")
+        claim(folder, self._about, PLAN, indent=1)
+        self._rows = RowStore(folder / "scenes.jsonl", "index")
 
     @property
     def made(self) -> int:
@@ -219,17 +195,10 @@ class Suite:
         for item in items:
             folders.setdefault(folder_of(item), []).append(item)
         datasets: dict[str, Dataset] = {}
-        for name in sorted(folders, key=_place):
+        for name in sorted(folders, key=lambda name: ([*_SPLITS, name].index(name), name)):
             write_folder(self.folder / name, folders[name])
             datasets[name] = load_dataset(self.folder / name)
-        about = {"generator": GENERATOR, "solvers": list(SOLVERS), "config": asdict(self.config)}
-        text = json.dumps(about | manifest_of(rows, items, datasets), indent=1)
+        text = json.dumps(self._about | contents_of(rows, items, datasets), indent=1)
         publish(self.folder / MANIFEST, f"{text}\n".encode(), "manifest")
         manifest: Row = json.loads(text)
         return manifest
-
-
-def _place(folder: str) -> tuple[int, str]:
-    """Order in which folders are named."""
-    order = ("train", "val", "test")
-    return (order.index(folder), "") if folder in order else (len(order), folder)

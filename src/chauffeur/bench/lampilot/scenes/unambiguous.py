@@ -1,4 +1,4 @@
-"""Whether words say exactly one goal: read back by rules and by Chauffeur's own understanding.
+"""Check that words say exactly one goal: they are read back by rules and by Chauffeur's own understanding.
 
 Two readers that know nothing of how the words were made must agree with the meaning: plain rules here (sides, numbers,
 units, whether a number is the new value or a difference) and `planners.onboard`, which must find exactly the goal and
@@ -41,7 +41,7 @@ def words_of(text: str) -> int:
 
 
 def fault_of(text: str, wish: SceneWish, max_words: int = MAX_WORDS) -> str:
-    """Why the words do not say exactly this wish, in a word or two for counting; empty when they do."""
+    """Reason why words do not say exactly this wish, short enough for counting; empty if they do."""
     if not MIN_WORDS <= words_of(text) <= max_words:
         return "length"
     if len(wish.means) == 1:
@@ -50,7 +50,7 @@ def fault_of(text: str, wish: SceneWish, max_words: int = MAX_WORDS) -> str:
 
 
 def fault_of_goal(text: str, goal: dict[str, Any], change: int = 0) -> str:
-    """Why the words do not say exactly this one goal; empty when they do.
+    """Reason why words do not say exactly this one goal; empty if they do.
 
     Args:
         text: The words.
@@ -148,7 +148,7 @@ def _rules(text: str, goal: dict[str, Any], expected: Meaning) -> str:
 
 
 def _says_difference(text: str) -> bool:
-    """Whether the number is a difference ("by 10", "10 closer") and not the new value ("to 10")."""
+    """True if the number is a difference ("by 10", "10 closer") and not the new value ("to 10")."""
     marked, found = mark_quantities(tokens_of(text))
     line = " ".join(marked)
     at = line.find("#")
@@ -160,7 +160,7 @@ def _says_difference(text: str) -> bool:
 
 
 def _differs(found: Meaning, expected: Meaning) -> str:
-    """Why a meaning found in the words is not the one expected; empty when it is."""
+    """Difference between the meaning found in the words and the one expected; empty for none."""
     if found.manoeuvre != expected.manoeuvre:
         return f"read as {found.family}"
     if found.variant not in ("", "hint", "return"):

@@ -1,6 +1,6 @@
 """Wishes of the original's kinds, drawn to fit the first instant of a drawn road.
 
-A wish makes sense where it is said: there is somebody to follow, a gap to close, a speed that is not driven already.
+A wish makes sense where it is said: there is a lead vehicle, a gap to close, a speed that is not driven already.
 Where none does, the draw is given up with a reason.
 """
 
@@ -43,7 +43,7 @@ EXITS: dict[str, tuple[str, str, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class Unfit:
-    """Why a drawn road does not suit its kind, in a few words for counting."""
+    """Reason why a drawn road does not suit its kind, short enough for counting."""
 
     why: str
 
@@ -184,14 +184,3 @@ def one_goal(kind: str, goal: dict[str, Any], section: str = "", **slots: str | 
 def plain(value: float) -> float | int:
     """A number as a file writes it: whole ones without a point."""
     return int(value) if float(value).is_integer() else round(value, 6)
-
-
-WISHES: tuple[tuple[tuple[str, ...], Drawer], ...] = (
-    (("dec_abs_dis", "inc_abs_dis", "dec_rel_dis", "inc_rel_dis"), distance_wish),
-    (("dec_abs_speed", "inc_abs_speed", "dec_rel_speed", "inc_rel_speed"), speed_wish),
-    (("left_lc", "right_lc"), lane_wish),
-    (("left_overtake", "right_overtake"), overtake_wish),
-    (("pull_over",), pull_over_wish),
-    (("go_straight", "turn_left", "turn_right"), route_wish),
-)
-"""Who draws the wish of a kind, by the beginning of its name."""

@@ -1,4 +1,4 @@
-"""What is wished in a scene, before it is put into words: the goal, the values named, and what the right answer is."""
+"""A wish of a scene before it is put into words: the goal, the values named, and what the right answer is."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Literal
 from chauffeur.concept import units
 
 Right = Literal["drive", "refuse", "ask"]
-"""What a good planner does: drive the goal, refuse the wish, or ask back."""
+"""Right answer of a planner: drive the goal, refuse the wish, or ask back."""
 
 System = Literal["metric", "imperial", "informal"]
 
@@ -65,7 +65,7 @@ class SceneWish:
 
     Attributes:
         sections: Grammar sections it may be worded with.
-        goal: Condition it is judged by (`goals` or `goals_more`).
+        goal: Condition it is judged by (`goals`).
         origin: LaMPilot's nearest condition, written into the DbLv1 file; the same as `goal` where LaMPilot has it.
         stem: Beginning of the task file's name.
         slots: Values the templates may name: a side, or a quantity.

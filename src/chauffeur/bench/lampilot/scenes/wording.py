@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -16,10 +15,8 @@ from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, SceneWish
 from chauffeur.bench.lampilot.scenes.wording_choice import normal
 from chauffeur.concept import InstructionError
 from chauffeur.concept.data import data_folder
-from chauffeur.language.grammar import Grammar, GrammarFrame, Manner, Template, Wording
+from chauffeur.language.grammar import Grammar, GrammarFrame, Manner, Wording
 from chauffeur.language.quantities import ONES, TENS
-
-__all__ = ["FILES", "Template", "Wording", "say", "sections", "templates"]
 
 FILES = ("pieces", "distance", "speed", "road", "steps", "hints", "refusals")
 
@@ -46,23 +43,9 @@ _MANNER = Manner(
 
 
 @cache
-def _grammar() -> Grammar:
+def grammar() -> Grammar:
+    """All templates of `data/scenes`. Raises DataError: they are not here, or damaged."""
     return Grammar(data_folder("scenes"), FILES, _MANNER)
-
-
-def templates(section: str, *, held: bool | None = None) -> tuple[Template, ...]:
-    """Templates of a section; `held` chooses those held out (True) or the others (False). KeyError if unknown."""
-    return _grammar().templates(section, held=held)
-
-
-def sections() -> tuple[str, ...]:
-    """Names of all sections."""
-    return _grammar().sections()
-
-
-def say(template: Template, slots: Mapping[str, str], rng: np.random.Generator) -> Wording:
-    """One wording of a template. KeyError if it has a slot that is not given."""
-    return _grammar().say(template, slots, rng)
 
 
 KEPT = 12
@@ -104,7 +87,7 @@ def word(wish: SceneWish, kind: Kind, slot: Slot, rng: np.random.Generator) -> C
     wanted = int(np.clip(round(float(rng.normal(kind.words, _SPREAD_WORDS))), MIN_WORDS, longest))
     # Extras have no splits and hold nothing out.
     held = None if slot.split == "extras" else slot.held
-    usable = [template for section in wish.sections for template in templates(section, held=held)]
+    usable = [template for section in wish.sections for template in grammar().templates(section, held=held)]
     kept: dict[str, Wording] = {}
     misread: Counter[str] = Counter()
     said = 0
@@ -112,7 +95,8 @@ def word(wish: SceneWish, kind: Kind, slot: Slot, rng: np.random.Generator) -> C
         if len(kept) >= KEPT:
             break
         template = usable[int(rng.integers(len(usable)))]
-        wording = say(template, _spoken(wish, rng), rng)
+        said_slots = {name: value if isinstance(value, str) else spoken(value, rng) for name, value in wish.slots}
+        wording = grammar().say(template, said_slots, rng)
         length = words_of(wording.text)
         # First those of about the wished length, later any: reading back is what costs time.
         near = abs(length - wanted) <= 1 + 4 * turn // MAX_SAID or turn > MAX_SAID // 2
@@ -127,10 +111,6 @@ def word(wish: SceneWish, kind: Kind, slot: Slot, rng: np.random.Generator) -> C
     if not kept:
         raise InstructionError(f"No wording says the wish of item {slot.index} ({kind.name}): {dict(misread)}.")
     return Candidates(tuple(kept.values()), wanted, said, misread)
-
-
-def _spoken(wish: SceneWish, rng: np.random.Generator) -> dict[str, str]:
-    return {name: value if isinstance(value, str) else spoken(value, rng) for name, value in wish.slots}
 
 
 def spoken(named: Named, rng: np.random.Generator) -> str:

@@ -22,7 +22,7 @@ from chauffeur.language.tokens import tokens_of
 
 Row = Mapping[str, Any]
 _CLOSE_WORDS = 0.02
-"""How near the mean length is brought to Tab. III's."""
+"""Words by which the mean length may differ from Tab. III's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[Sce
     options = [_options(row, avoid) for row in rows]
     chosen: list[SceneChoice] = []
     for row, held in zip(rows, options, strict=True):
-        forms = uses[_group(row)]
+        forms = uses[row["part"] or row["split"]]  # where no form should come twice
         length = int(row["length"])
         best = min(held, key=partial(_cost, forms=forms, length=length))
         forms[best.form] += 1
@@ -86,11 +86,6 @@ def _options(row: Row, avoid: Set[str]) -> list[SceneChoice]:
             hint="Choose another seed.",
         )
     return held
-
-
-def _group(row: Row) -> str:
-    """Where a form should not come twice: within a split; each part of the extras counts by itself."""
-    return str(row["part"] or row["split"])
 
 
 def _balance(

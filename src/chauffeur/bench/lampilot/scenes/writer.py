@@ -27,13 +27,11 @@ class SceneItem:
         task: Name of its task file, without ending.
         content: What the task file holds.
         note: Its annotation.
-        words: Its instruction.
     """
 
     task: str
     content: dict[str, Any]
     note: Annotation
-    words: str
 
 
 def items_of(rows: Sequence[Mapping[str, Any]], choices: Sequence[SceneChoice]) -> list[SceneItem]:
@@ -69,7 +67,7 @@ def _item(row: Mapping[str, Any], choice: SceneChoice, task: str) -> SceneItem:
         expert_s=round(row["expert_ticks"] / 10, 1),
     )
     sample = {"env": row["env"], "eval": row["origin"], "seed": row["seed"]}
-    return SceneItem(task, {"commands": [choice.text], "samples": [sample]}, note, choice.text)
+    return SceneItem(task, {"commands": [choice.text], "samples": [sample]}, note)
 
 
 def folder_of(item: SceneItem) -> str:

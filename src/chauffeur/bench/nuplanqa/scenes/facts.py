@@ -1,4 +1,4 @@
-"""What is true of a scene and can be seen in its pictures: a class for every family of questions that can be asked.
+"""Ground truth of a scene that its pictures show: a class for every family of questions that can be asked.
 
 A question is left out where its answer cannot be seen, or where two of its options could be called right.
 """
@@ -34,12 +34,12 @@ FAMILIES: Final[Mapping[str, str]] = {
 """Families of questions, and the subtask each belongs to."""
 
 ASKED_M: Final = 45.0
-"""Who is ahead at a greater distance is too small in the pictures to be asked about."""
+"""A vehicle ahead at a greater distance is too small in the pictures to be asked about."""
 _CHANGE_M: Final = 2.0
 _SAME_M: Final = 0.8
 """Change of the gap over the clip from which it is told to open or close, and below which to stay."""
 _TOLD_APART: Final = ("nobody", "car", "truck", "bus")
-"""What is beside or behind, and is asked about."""
+"""Classes beside or behind that are asked about."""
 _FAST_UNCLEAR: Final = frozenset({"light", "lanes", "layout", "key", "manoeuvre", "situation", "action"})
 
 
@@ -59,7 +59,7 @@ class Fact:
 
 
 def facts_of(scene: QaScene, seen: Seen, *, asked: bool = True) -> Iterator[Fact]:
-    """What can be asked about a scene; or, not `asked`, what is true of it and told by its speed as well."""
+    """Facts that can be asked about a scene; if not `asked`, also those that its speed gives away."""
     closed = scene.unclear | (_FAST_UNCLEAR if scene.fast and asked else frozenset())
     for family, value in _plain(scene, seen):
         if value and family not in closed:
@@ -93,7 +93,7 @@ def _plain(scene: QaScene, seen: Seen) -> Iterator[tuple[str, str]]:
 
 
 def _clear(user: QaUser | None, seen: Seen) -> bool:
-    """Whether somebody is seen, or is not there."""
+    """True if a road user is seen, or there is none."""
     return user is None or user.id in seen
 
 
@@ -102,14 +102,14 @@ def _kind(user: QaUser | None) -> str:
 
 
 def _density(scene: QaScene, seen: Seen) -> str:
-    """How many vehicles are ahead; not asked where one of them cannot be made out."""
+    """Number of vehicles ahead, as a class; not asked where one of them cannot be made out."""
     if any(one.id not in seen for one in scene.ahead):
         return ""
     return ("nobody", "one", "two", "more")[min(len(scene.ahead), 3)]
 
 
 def _gap(scene: QaScene) -> str:
-    """How the gap to the lead vehicle has changed over the clip; of a standing ego it tells nothing."""
+    """Change of the gap to the lead vehicle over the clip; of a standing ego it tells nothing."""
     if scene.motion == "still":
         return ""
     if scene.lead is None:
@@ -129,7 +129,7 @@ def _distance_m(instant: Observation, who: int) -> float | None:
 
 
 def _reasons(scene: QaScene) -> list[str]:
-    """What the ego has to heed."""
+    """Things the ego has to heed."""
     found: list[str] = []
     if scene.walker is not None:
         found.append(f"walker {scene.walker_from}")
@@ -172,7 +172,7 @@ def _situation(scene: QaScene) -> str:
 
 
 def _action(scene: QaScene) -> str:
-    """What a careful driver does next; of a standing ego nothing is asked."""
+    """Next action of a careful driver; of a standing ego nothing is asked."""
     found = _reasons(scene)
     if scene.motion == "still" or len(found) > 1:
         return ""
@@ -189,7 +189,7 @@ def _action(scene: QaScene) -> str:
 
 
 def sighted(scene: QaScene, reach_m: float = 70.0, hidden: float = 0.6) -> frozenset[int | str]:
-    """Who can be made out by geometry alone, where nothing is rendered: near enough, and not behind somebody nearer.
+    """Road users visible by geometry alone, where nothing is rendered: near enough and not occluded.
 
     Args:
         scene: The scene.

@@ -1,4 +1,4 @@
-"""What a set of questions must not give away: its gate.
+"""The gate of a set of questions: it must not give away its answers.
 
 Whoever reads only options, or options and control signals, or goes by lengths or letters, must do little better than
 chance (25 %). The bound is 35 %.
@@ -45,21 +45,22 @@ class GateLine:
         return f"{self.worst} {self.worst_accuracy:.1%}" if self.worst else "too few questions"
 
     def passes(self, bound: float = BOUND) -> bool:
-        """Whether the set withstands it: over all questions, where there are enough to tell."""
+        """True if the set withstands it: over all questions, where there are enough to tell."""
         return self.questions < LEAST or self.accuracy <= bound
 
 
 def gate(items: Sequence[VqaItem], taught: Sequence[VqaItem] = ()) -> tuple[GateLine, ...]:
-    """How far each trick leads.
+    """Accuracy of each trick.
 
     Args:
         items: The set.
         taught: Another set, e.g. the training split, from which the blind baseline learns as well.
     """
+    usual = Counter(item.answer for item in items).most_common(1)[0][0] if items else 0
     lines = [
         _line("longest option", items, [by_length(item, longest=True) for item in items]),
         _line("shortest option", items, [by_length(item, longest=False) for item in items]),
-        _line("most frequent letter", items, _most_frequent(items)),
+        _line("most frequent letter", items, [usual] * len(items)),
     ]
     for signals, what in ((False, "words of the options"), (True, "words of the options and control signals")):
         guesses = blind_guesses(items, signals=signals)
@@ -69,11 +70,6 @@ def gate(items: Sequence[VqaItem], taught: Sequence[VqaItem] = ()) -> tuple[Gate
             found = fit_blind(taught, signals=signals).guess(items).tolist()
             lines.append(_line(f"{what}, learned from the training split", items, found))
     return tuple(lines)
-
-
-def _most_frequent(items: Sequence[VqaItem]) -> list[int]:
-    letter = Counter(item.answer for item in items).most_common(1)[0][0] if items else 0
-    return [letter] * len(items)
 
 
 def _line(trick: str, items: Sequence[VqaItem], guesses: Sequence[int]) -> GateLine:

@@ -41,6 +41,7 @@ from chauffeur.bench.nuplanqa.scenes.staging import stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs
 from chauffeur.bench.nuplanqa.scenes.worlds import CLIPS, world_scene
 from chauffeur.bench.openloop.driving import UNSEEN_TOWN, Place
+from chauffeur.bench.sets import claim
 from chauffeur.camera import LOOKS, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
@@ -68,7 +69,7 @@ _CYCLE: Final[tuple[Place | Staged, ...]] = (
     *(_STAGED, "highway", _STAGED, "town", _STAGED, "highway"),
     *(_STAGED, "town", _STAGED, "highway", "crossing", "lot"),
 )
-"""Where scenes come from, one after the other."""
+"""Sources of scenes, one after the other."""
 assert _CYCLE.count("town") == CLIPS
 SOURCES: Final[Mapping[str, tuple[Place | Staged, ...]]] = {
     "all": _CYCLE,
@@ -84,7 +85,7 @@ _SEED_OF: Final[Mapping[Split, int]] = {"train": 0, "val": 1, "test": 2}
 
 @dataclass(frozen=True, slots=True)
 class QaConfig:
-    """What decides a set.
+    """Configuration of a set.
 
     Attributes:
         scenes: Of the training split; the others have a fifth each.
@@ -122,7 +123,7 @@ class QaConfig:
 
     @property
     def instants(self) -> tuple[int, ...]:
-        """Which instants of a clip are rendered: the last ones; of two the first and the last, which show most."""
+        """Rendered instants of a clip: the last ones; of two the first and the last, which show most."""
         return (0, SAMPLES - 1) if self.frames == 2 else tuple(range(SAMPLES - self.frames, SAMPLES))
 
 
@@ -147,7 +148,7 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
     if not 1 <= config.frames <= SAMPLES:
         raise ConfigError(f"A clip has no {config.frames} instants.", hint=f"Give 1 to {SAMPLES}.")
     own = folder / split
-    _claim(folder, config)
+    claim(folder, {"made": MADE, **asdict(config)})
     rig = config.rig
     look = LOOKS[config.look] if split == "test" else LOOKS["default"]
     renderer = make_renderer() if config.pictures else None
@@ -216,7 +217,7 @@ def shoot_part(folder: Path, split: Split, config: QaConfig, part: int, parts: i
 
 @dataclass(frozen=True, slots=True)
 class MadeSet:
-    """What came of making a set: questions by split, and the gate over the test split."""
+    """Result of making a set: questions by split, and the gate over the test split."""
 
     questions: Mapping[str, int]
     gate: tuple[GateLine, ...]
@@ -242,7 +243,7 @@ def make_set(folder: Path, config: QaConfig, workers: int, watch: Watch) -> Made
         raise ConfigError(f"There are no scenes {config.sources!r}.", hint=f"Choose of: {', '.join(SOURCES)}.")
     splits: tuple[Split, ...] = ("train", "val", "test")
     total = sum(map(config.count, splits))
-    _claim(folder, config)
+    claim(folder, {"made": MADE, **asdict(config)})
     shot = config.pictures and workers > 1
     if shot:
         make_renderer().close()  # what is missing is said here, once
@@ -250,18 +251,13 @@ def make_set(folder: Path, config: QaConfig, workers: int, watch: Watch) -> Made
     done = 0
     made: dict[Split, tuple[VqaItem, ...]] = {}
     for split in splits:
-        before = done
-        told: Watch = _unwatched if shot else lambda some, _, before=before: watch(before + some, total)
-        made[split] = make_split(folder, split, config, told)
+        made[split] = make_split(
+            folder, split, config, lambda some, _, before=done: None if shot else watch(before + some, total)
+        )
         done += config.count(split)
     tried = gate(made["test"], made["train"])
     write_card(folder, config, made, tried)
     return MadeSet({split: len(items) for split, items in made.items()}, tried)
-
-
-def _unwatched(done: int, of: int) -> None:
-    """Tells nobody: the scenes were counted when they were rendered."""
-    del done, of
 
 
 def _shoot_all(
@@ -357,14 +353,3 @@ def _pairs(scene: QaScene, facts: list[Fact], each: int, rng: np.random.Generato
 
 def _token(seed: int, split: Split, number: int) -> str:
     return hashlib.sha256(f"{MADE} {seed} {split} {number}".encode()).hexdigest()[:16]
-
-
-def _claim(folder: Path, config: QaConfig) -> None:
-    path = folder / "config.json"
-    wanted = {"made": MADE, **asdict(config)}
-    if path.is_file():
-        if json.loads(path.read_text(encoding="utf-8")) != wanted:
-            raise ConfigError(f"{folder} holds a set of another configuration.", hint="Choose another folder.")
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(path, wanted)

@@ -1,6 +1,6 @@
-"""What is true of a clip of any world, read from its observations: lanes, who is where, lights, how the road goes on.
+"""Ground truth of a clip of any world, read from its observations: lanes, who is where, lights, how the road goes on.
 
-Where two answers could be called right (somebody between two lanes, a junction not yet near, a vehicle just out of
+Where two answers could be called right (a vehicle between two lanes, a junction not yet near, a vehicle just out of
 reach), the family of questions is named unclear and is not asked.
 """
 
@@ -21,7 +21,7 @@ from chauffeur.describe.town import own_signals
 from chauffeur.geometry import Lane, Polyline
 
 SIGHT_M: Final = 100.0
-"""How far ahead somebody is the lead vehicle."""
+"""Greatest distance of a lead vehicle."""
 _DENSITY_M: Final = 60.0
 """Vehicles this far ahead are counted; those beyond make the count unclear."""
 _JUNCTION_M: Final = 45.0
@@ -35,7 +35,7 @@ _BEHIND_M: Final = 28.0
 _NOT_BEHIND_M: Final = 60.0
 _IN_LANE: Final = 0.42
 _HALF_IN_LANE: Final = 0.75
-"""Share of a lane's width by which somebody in it is off its middle; up to the second it is unclear."""
+"""Share of a lane's width by which a vehicle in it is off its middle; up to the second it is unclear."""
 _ALONG_RAD: Final = math.radians(35.0)
 _STRAIGHT_RAD: Final = 0.04
 _BENT_RAD: Final = 0.2
@@ -53,7 +53,7 @@ _STREET_RAD: Final = math.radians(135.0)
 
 
 def motion_of(instants: Sequence[Observation]) -> Motion | None:
-    """How the ego moves in a clip; None where two answers could be called right, or where it turns."""
+    """Motion of the ego in a clip; None where two answers could be called right, or where it turns."""
     if any(abs(one.ego.steering_rad) > _STEERING_RAD for one in instants):
         return None
     speeds = [one.ego.speed_mps for one in instants]
@@ -130,7 +130,7 @@ def _way(observation: Observation) -> _Way:
 def read_scene(
     instants: Sequence[Observation], token: str, source: str, sky: Sky, shakes_rad: Sequence[float]
 ) -> QaScene | None:
-    """What is true of a clip; None where nothing can be asked about it.
+    """Ground truth of a clip; None where nothing can be asked about it.
 
     Args:
         instants: Five, half a second apart.
@@ -254,7 +254,7 @@ def _lead(way: _Way, unclear: set[str]) -> QaUser | None:
 
 
 def _beside(way: _Way, lanes: Sequence[Lane], own: int, side: int, unclear: set[str]) -> QaUser | None:
-    """Who is next to the ego in the lane on a side (-1 left, 1 right)."""
+    """Vehicle next to the ego in the lane on a side (-1 left, 1 right)."""
     if not 0 <= own + side < len(lanes):
         return None
     middle = -side * (way.lane.width_m + lanes[own + side].width_m) / 2.0
@@ -314,7 +314,7 @@ def _ahead(way: _Way, lanes: Sequence[Lane], own: int, unclear: set[str]) -> tup
 
 
 def _walker(way: _Way, unclear: set[str]) -> tuple[QaUser | None, Literal["left", "right"]]:
-    """Who is on foot on the carriageway ahead, and from which side they come."""
+    """Pedestrian on the carriageway ahead, and the side they come from."""
     found: list[tuple[QaUser, Literal["left", "right"]]] = []
     road = way.observation.road
     for one, ahead, offset in way.users:
@@ -325,7 +325,7 @@ def _walker(way: _Way, unclear: set[str]) -> tuple[QaUser | None, Literal["left"
             continue
         along = math.remainder(one.heading_rad - way.line.at(way.at_m + ahead).heading_rad, math.tau)
         side: Literal["left", "right"] = "right" if along > 0.0 else "left"
-        # Somebody who has passed the ego's lane, or goes along it, or is far: a matter of opinion.
+        # A pedestrian who has passed the ego's lane, or goes along it, or is far: a matter of opinion.
         passed = offset > 2.0 if side == "right" else offset < -2.0
         crosses = one.speed_mps > 0.3 and math.radians(50.0) < abs(along) < math.radians(130.0)
         if passed or not crosses or ahead > _WALKER_M:

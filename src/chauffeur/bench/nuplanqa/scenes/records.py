@@ -1,4 +1,4 @@
-"""What is written of a scene: pictures, the published metadata, who can be made out, and the ground truth."""
+"""Records of a scene: pictures, the published metadata, visible road users, and the ground truth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def save_pictures(folder: Path, token: str, taken: CameraImages) -> None:
 
 
 def calibrated(token: str, cameras: Sequence[Camera], instant: Observation) -> dict[str, Any]:
-    """Where the pictures of an instant are, their calibration, and the ego's pose: keys of the published metadata."""
+    """Paths of an instant's pictures, their calibration, and the ego's pose: keys of the published metadata."""
     cams = {
         camera.name: {
             "data_path": _picture(token, camera.name),
@@ -88,7 +88,7 @@ def metadata_of(scene: QaScene, rig: Rig, rendered: Sequence[int]) -> dict[str, 
 
 
 def truth_of(scene: QaScene, seen: Seen, glimpsed: Seen, rig: Rig) -> dict[str, Any]:
-    """What a network may be taught besides the questions: classes of all families, and who is where.
+    """Targets that a network may be taught besides the questions: classes of all families, and who is where.
 
     Road users are (kind, x, y, whether they can be made out), in the frame of the rig: x forward, y left, m. Of the
     lead vehicle: how far ahead, centre to centre, m, and how much faster than the ego it is, m/s; nothing where it

@@ -15,7 +15,7 @@ FAST_MPS: Final = 14.5
 """Above it the ego's speed tells what kind of road it is on, and nothing that hangs on the road is asked."""
 
 LEFT_TAKEN_M: Final = 50.0
-"""Somebody this near in the lane on the left is in the way of who would pass there."""
+"""A vehicle this near in the lane on the left is in the way of passing there."""
 
 Motion = Literal["still", "steady", "faster", "slower"]
 Sky = Literal["clear day", "rainy day", "foggy day", "snowy day", "clear night", "rainy night"]
@@ -62,9 +62,9 @@ class QaScene:
         sky: Weather and light.
         light: What the ego's traffic light shows; None without one.
         light_id: Its id in the observations.
-        left_taken: Whether somebody is farther ahead in the lane on the left, and passing is a matter of opinion.
-        lead, left, right, behind: Who is ahead in the ego's lane, beside it on either side, behind it; None for nobody.
-        walker: Who is on the road ahead; None for nobody.
+        left_taken: Whether a vehicle is farther ahead in the lane on the left, and passing is a matter of opinion.
+        lead, left, right, behind: Vehicle ahead in the ego's lane, beside it on either side, behind it; None for none.
+        walker: Pedestrian on the road ahead; None for none.
         walker_from: From which side they come.
         ahead: Vehicles wholly ahead of the ego in its direction.
         unclear: Families of questions that are not asked, as two answers could be called right; `lead` stands for all
@@ -105,7 +105,7 @@ class QaScene:
 
     @property
     def fast(self) -> bool:
-        """Whether the ego's speed tells what kind of road it is on."""
+        """True if the ego's speed tells what kind of road it is on."""
         return max(one.ego.speed_mps for one in self.instants) > FAST_MPS
 
     @property

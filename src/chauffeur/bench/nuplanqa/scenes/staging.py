@@ -1,8 +1,8 @@
-"""Scenes on streets: who is where, how everybody has moved for the last two seconds, light and weather.
+"""Scenes on streets: road users, their motion over the last two seconds, light and weather.
 
 What a question asks about (ego motion, lights, weather, who is ahead, beside and behind, people on the road) is drawn
 independently, so that neither the control signals nor one fact gives another away. Road users keep a constant
-acceleration along their lane; nobody overlaps at any instant. These are staged scenes: no simulator has driven them.
+acceleration along their lane; no two overlap at any instant. These are staged scenes: no simulator has driven them.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ TOP_MPS: Final = 14.0
 EGO_SIZE: Final = (5.2, 2.0)
 Theme = Literal["any", "junction", "walker", "pass", "slow", "dense"]
 _THEMES: Final[tuple[Theme, ...]] = ("any", "any", "junction", "junction", "walker", "pass", "slow", "dense")
-"""What a scene is about. Without themes, a walker with nothing else to heed or a lane free to pass in is rare."""
+"""Theme of a scene. Without themes, a walker with nothing else to heed or a lane free to pass in is rare."""
 _LEADS: Final = ("none", "none", "near", "near", "closing", "opening", "opening", "far")
 _FAR_M: Final = (30.0, 95.0)
-"""Where a lead vehicle of `far` is; only the nearer ones are asked about."""
+"""Distance of a lead vehicle of `far`, m; only the nearer ones are asked about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,22 +92,7 @@ class StagedMover:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class StagedScene(QaScene):
-    """A clip with what it was made from.
-
-    Attributes:
-        plan: The street.
-        ego: The ego.
-        others: All other road users.
-    """
-
-    plan: StreetPlan
-    ego: StagedMover
-    others: tuple[StagedMover, ...]
-
-
-def stage(token: str, rng: np.random.Generator) -> StagedScene:
+def stage(token: str, rng: np.random.Generator) -> QaScene:
     """Draw a scene."""
     while True:
         scene = _draw(token, rng)
@@ -115,7 +100,7 @@ def stage(token: str, rng: np.random.Generator) -> StagedScene:
             return scene
 
 
-def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
+def _draw(token: str, rng: np.random.Generator) -> QaScene | None:
     theme = _THEMES[int(rng.integers(len(_THEMES)))]
     plan = _street(rng, theme)
     motion: Motion = ("still", "steady", "faster", "slower")[int(rng.integers(4))]
@@ -126,28 +111,30 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
     own = int(rng.integers(1 if theme == "pass" else 0, plan.lanes))
     ego = StagedMover(EGO_ID, "car", 0.0, plan.lane_offset(own), speed, gain)
     crowd = _Crowd(plan, rng, [])
-    lead = _lead(plan, crowd, rng, own, ego, theme)
-    apart = theme == "dense" and rng.random() < 0.7  # with somebody half beside the ego, nobody counts who is ahead
-    left = None if apart or theme == "pass" else _beside(plan, crowd, rng, own - 1)
-    right = None if apart else _beside(plan, crowd, rng, own + 1)
+    lead = _lead(crowd, own, ego, theme)
+    apart = (
+        theme == "dense" and rng.random() < 0.7
+    )  # with a vehicle half beside the ego, the count of those ahead is unclear
+    left = None if apart or theme == "pass" else _beside(crowd, own - 1)
+    right = None if apart else _beside(crowd, own + 1)
     behind = None
     if rng.random() < 0.55:
         behind = crowd.add(_vehicle(rng), -float(rng.uniform(11.0, 22.0)), plan.lane_offset(own), speed)
-    walker = _walker(plan, crowd, rng, theme)
+    walker = _walker(crowd, theme)
     light: SignalState | None = None
     if plan.kind == "crossing" and rng.random() < 0.78:
         light = ("red", "yellow", "green")[int(rng.integers(3))]
     near = lead is not None and lead.station_m < _FAR_M[0]
-    _fill(plan, crowd, rng, None if near else own, theme)
+    _fill(crowd, None if near else own, theme)
     road = road_of(plan)
-    everybody = (ego, *crowd.movers)
-    if _overlap(plan, everybody):
+    movers = (ego, *crowd.movers)
+    if _overlap(plan, movers):
         return None
     sky: Sky = SKIES[int(rng.integers(len(SKIES)))]
     signals = _signals(plan, light)
     shakes = rng.normal(0.0, SHAKE_RAD, SAMPLES).tolist()
     ahead, astride = _ahead(crowd.movers)
-    return StagedScene(
+    return QaScene(
         token=token,
         source=f"staged {plan.kind}",
         kind=plan.kind,
@@ -170,10 +157,7 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
         walker_from="left" if walker is not None and walker.across_mps < 0.0 else "right",
         ahead=ahead,
         unclear=frozenset({"density"} if astride else ()),
-        instants=tuple(_observe(plan, road, everybody, signals, place, shake) for place, shake in enumerate(shakes)),
-        plan=plan,
-        ego=ego,
-        others=tuple(crowd.movers),
+        instants=tuple(_observe(plan, road, movers, signals, place, shake) for place, shake in enumerate(shakes)),
     )
 
 
@@ -237,9 +221,8 @@ def _vehicle(rng: np.random.Generator) -> AgentKind:
     return kinds[int(rng.integers(3))]
 
 
-def _lead(
-    plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, own: int, ego: StagedMover, theme: Theme
-) -> StagedMover | None:
+def _lead(crowd: _Crowd, own: int, ego: StagedMover, theme: Theme) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     how = _LEADS[int(rng.integers(len(_LEADS)))]
     if theme in ("pass", "slow"):
         how = "closing"
@@ -280,7 +263,8 @@ def _lead(
     return crowd.add(kind, at, plan.lane_offset(own), its, ego.acceleration_mps2)
 
 
-def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int) -> StagedMover | None:
+def _beside(crowd: _Crowd, lane: int) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     if not 0 <= lane < plan.lanes or rng.random() < 0.3:
         return None
     kind = _vehicle(rng)
@@ -288,7 +272,8 @@ def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int
     return crowd.add(kind, float(rng.uniform(1.0, 8.0)), plan.lane_offset(lane), speed)
 
 
-def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Theme) -> StagedMover | None:
+def _walker(crowd: _Crowd, theme: Theme) -> StagedMover | None:
+    plan, rng = crowd.plan, crowd.rng
     if plan.crosswalk_m is None or (theme != "walker" and rng.random() < 0.5):
         return None
     side = 1.0 if rng.random() < 0.5 else -1.0
@@ -297,8 +282,9 @@ def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Th
     return crowd.add("pedestrian", plan.crosswalk_m, offset, 0.0, across_mps=-side * 1.3)
 
 
-def _fill(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, empty: int | None, theme: Theme) -> None:
-    """Further traffic: oncoming, farther ahead in other lanes, people on the pavement; nobody in an `empty` lane."""
+def _fill(crowd: _Crowd, empty: int | None, theme: Theme) -> None:
+    """Further traffic: oncoming, farther ahead in other lanes but an `empty` one, people on the pavement."""
+    plan, rng = crowd.plan, crowd.rng
     for index in range(plan.oncoming):
         for _ in range(int(rng.integers(0, 3))):
             at, speed = float(rng.uniform(5.0, 70.0)), float(rng.uniform(4.0, 11.0))
@@ -318,11 +304,11 @@ def _fill(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, empty: int 
             crowd.add("pedestrian", float(rng.uniform(-20.0, 45.0)), offset, float(rng.choice([-1.3, 1.3])))
 
 
-def _overlap(plan: StreetPlan, everybody: Sequence[StagedMover]) -> bool:
-    """Whether two are closer than half a metre at any instant."""
+def _overlap(plan: StreetPlan, movers: Sequence[StagedMover]) -> bool:
+    """True if two road users are closer than half a metre at any instant."""
     for place in range(SAMPLES):
         ago = STEP_S * (SAMPLES - 1 - place)
-        boxes = [_state(plan, mover.at(ago)).box for mover in everybody]
+        boxes = [_state(plan, mover.at(ago)).box for mover in movers]
         for i, one in enumerate(boxes):
             for other in boxes[i + 1 :]:
                 reach = (one.length_m + other.length_m) / 2.0 + 2.0
@@ -355,14 +341,14 @@ def _signals(plan: StreetPlan, light: SignalState | None) -> tuple[Signal, ...]:
 def _observe(
     plan: StreetPlan,
     road: RoadGraph,
-    everybody: Sequence[StagedMover],
+    movers: Sequence[StagedMover],
     signals: tuple[Signal, ...],
     place: int,
     shake_rad: float,
 ) -> Observation:
     """The instant of a place in the clip; the ego's front wheels are shaken by a small angle, as a driver's are."""
     ago = STEP_S * (SAMPLES - 1 - place)
-    ego, *others = (_state(plan, mover.at(ago)) for mover in everybody)
+    ego, *others = (_state(plan, mover.at(ago)) for mover in movers)
     return Observation(
         time_s=place * STEP_S,
         tick=place,

@@ -7,6 +7,7 @@ Traffic drives on the right. The junction, where there is one, is crossed by a s
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, Literal
@@ -24,7 +25,7 @@ _STEP_M: Final = 4.0
 
 @dataclass(frozen=True, slots=True)
 class StreetPlan:
-    """What a street is like.
+    """Layout of a street.
 
     Attributes:
         kind: `highway` (no oncoming traffic), `street` (two-way, pavements), `crossing` (a street with a junction).
@@ -89,22 +90,16 @@ def road_of(plan: StreetPlan) -> RoadGraph:
     length = plan.junction_length_m
     for index in range(plan.lanes):
         offset = plan.lane_offset(index)
-        if cut is None:
-            lanes.append(Lane(f"own.{index}", plan.line(offset), WIDTH_M, limit, road="own", index=index))
-            continue
-        parts = (("own", -BACK_M, cut, ""), ("over", cut, cut + length, "J"), ("off", cut + length, AHEAD_M, ""))
+        parts = [("own", -BACK_M, AHEAD_M, "")]
+        if cut is not None:
+            parts = [("own", -BACK_M, cut, ""), ("over", cut, cut + length, "J"), ("off", cut + length, AHEAD_M, "")]
         lanes += _row(plan, parts, index, offset, limit)
     for index in range(plan.oncoming):
         offset = plan.oncoming_offset(index)
-        if cut is None:
-            line = plan.line(offset, AHEAD_M, -BACK_M)
-            lanes.append(Lane(f"other.{index}", line, WIDTH_M, limit, road="other", index=index))
-            continue
-        parts = (
-            ("other", AHEAD_M, cut + length, ""),
-            ("other_over", cut + length, cut, "J"),
-            ("other_off", cut, -BACK_M, ""),
-        )
+        parts = [("other", AHEAD_M, -BACK_M, "")]
+        if cut is not None:
+            parts = [("other", AHEAD_M, cut + length, ""), ("other_over", cut + length, cut, "J")]
+            parts.append(("other_off", cut, -BACK_M, ""))
         lanes += _row(plan, parts, index, offset, limit)
     if cut is not None:
         lanes += _cross_street(cut, length, limit)
@@ -114,25 +109,22 @@ def road_of(plan: StreetPlan) -> RoadGraph:
 
 
 def _row(
-    plan: StreetPlan, parts: tuple[tuple[str, float, float, str], ...], index: int, offset: float, limit: float
+    plan: StreetPlan, parts: Sequence[tuple[str, float, float, str]], index: int, offset: float, limit: float
 ) -> list[Lane]:
     names = [f"{name}.{index}" for name, *_ in parts]
-    found: list[Lane] = []
-    for place, (name, start, end, junction) in enumerate(parts):
-        onward = (names[place + 1],) if place + 1 < len(names) else ()
-        found.append(
-            Lane(
-                names[place],
-                plan.line(offset, start, end),
-                WIDTH_M,
-                limit,
-                road=name,
-                index=index,
-                successors=onward,
-                junction=junction,
-            )
+    return [
+        Lane(
+            names[place],
+            plan.line(offset, start, end),
+            WIDTH_M,
+            limit,
+            road=name,
+            index=index,
+            successors=tuple(names[place + 1 : place + 2]),
+            junction=junction,
         )
-    return found
+        for place, (name, start, end, junction) in enumerate(parts)
+    ]
 
 
 def _cross_street(cut: float, length: float, limit: float) -> list[Lane]:
@@ -146,19 +138,9 @@ def _cross_street(cut: float, length: float, limit: float) -> list[Lane]:
         names = (f"{name}.0", f"{name}_over.0", f"{name}_off.0")
         for place, (start, end) in enumerate(pairwise(ends)):
             line = Polyline.of(((x, start), (x, end)))
-            onward = (names[place + 1],) if place < 2 else ()
-            junction = "J" if place == 1 else ""
-            found.append(
-                Lane(
-                    names[place],
-                    line,
-                    WIDTH_M,
-                    limit,
-                    road=names[place][:-2],
-                    successors=onward,
-                    junction=junction,
-                )
-            )
+            onward, junction = names[place + 1 : place + 2], "J" if place == 1 else ""
+            road = names[place].removesuffix(".0")
+            found.append(Lane(names[place], line, WIDTH_M, limit, road=road, successors=onward, junction=junction))
     return found
 
 

@@ -30,7 +30,7 @@ _SLACK: Final = 2
 
 
 _NEVER_FAST: Final = ("bicycle",)
-"""What is not met at a motorway's speed, and holds no other class back there."""
+"""Classes not met at a motorway's speed, which hold no other class back there."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def word_bank() -> WordBank:
 
 
 def half_of(split: Split) -> str:
-    """Which half of the wordings a split speaks: those of `test` are heard nowhere else."""
+    """Half of the wordings that a split uses: those of `test` are heard nowhere else."""
     return "test" if split == "test" else "train"
 
 
@@ -107,7 +107,7 @@ class QuestionWriter:
 
     @property
     def asked(self) -> list[list[Any]]:
-        """How often each class was asked about, as JSON: what `go_on` takes."""
+        """Questions asked by class, as JSON; input of `go_on`."""
         return [[*group, dict(count)] for group, count in self._asked.items()]
 
     def go_on(self, asked: Sequence[Sequence[Any]]) -> None:
@@ -118,7 +118,7 @@ class QuestionWriter:
         }
 
     def _wanted(self, scene: QaScene, fact: Fact) -> bool:
-        """Whether the fact's class is not yet ahead of others, among scenes whose speeds tell the same."""
+        """True if the fact's class is not yet ahead of others, among scenes whose speeds tell the same."""
         bank = word_bank().families[fact.family]
         count = self._asked.setdefault((fact.family, fact.side, scene.motion, scene.fast), Counter())
         never = _NEVER_FAST if scene.fast else ()
