@@ -5,9 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import (
+    Any,
+    Final,
+    NotRequired,  # pydantic reads the standard library's from Python 3.12 on only
+)
 
-from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
+from typing_extensions import TypedDict
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.store import Row
@@ -43,7 +47,9 @@ class StudyConfig:
     trips: int = 5
 
 
-class _TripFields(TypedDict):
+class TripRow(TypedDict):
+    """A trip; the fields of its plan are missing where the passenger chose."""
+
     passenger: str
     arm: str
     task: str
@@ -68,18 +74,13 @@ class _TripFields(TypedDict):
     model: str
     half: str
     note: str
-
-
-class TripRow(_TripFields, total=False):
-    """A trip; the fields of its plan are missing where the passenger chose."""
-
-    declined: bool
-    refusal: str
-    intent: str
-    policy: dict[str, Any] | None
-    recalled: int
-    feedback: str
-    latency_s: float
+    declined: NotRequired[bool]
+    refusal: NotRequired[str]
+    intent: NotRequired[str]
+    policy: NotRequired[dict[str, Any] | None]
+    recalled: NotRequired[int]
+    feedback: NotRequired[str]
+    latency_s: NotRequired[float]
 
 
 class StudyBenchmark(Unasked):
