@@ -65,7 +65,6 @@ def test_the_driving_score_is_the_mean_of_products() -> None:
         DrivenRoute(RouteScore(50.0, 1.0, 50.0), {}, 1000.0),
     ]
     assert mean_score(routes) == RouteScore(75.0, 0.75, 50.0)
-    assert mean_score(routes, planned=4) == RouteScore(37.5, 0.375, 25.0)
     assert mean_score([]) == RouteScore(0.0, 0.0, 0.0)
 
 

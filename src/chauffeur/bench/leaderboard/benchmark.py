@@ -17,6 +17,7 @@ from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.leaderboard.drivers import DRIVERS
 from chauffeur.bench.leaderboard.instructed import SETTINGS, PlannerSpec
+from chauffeur.bench.leaderboard.own_routes import own_routes
 from chauffeur.bench.leaderboard.results import NOT_DRIVEN, LeaderboardRow, counted, infractions_of
 from chauffeur.bench.leaderboard.rollout import ROUTE_VERSION, RouteJob
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile, read_routes
@@ -340,8 +341,6 @@ def _planner_spec(name: str, setting: str, repository: str, latency_s: float | N
 
 def _files(routes: str, scenarios: str, triggers: str) -> tuple[RouteFile, TriggerSet]:
     if routes == "own":
-        from chauffeur.bench.leaderboard.own_routes import own_routes
-
         file, found = own_routes()
         return file, found if scenarios != "none" else TriggerSet({}, "")
     path = Path(routes)

@@ -83,11 +83,6 @@ class RouteCompletion:
         """Of the way, 0..1."""
         return 1.0 if self.completed else self._track.stations_m[self._index] / self._track.length_m
 
-    @property
-    def index(self) -> int:
-        """The last point passed."""
-        return self._index
-
     def update(self, observation: Observation) -> Sequence[Infraction]:
         if self.completed:
             return ()
@@ -324,7 +319,7 @@ class StopSigns:
         if -self.AHEAD_M <= to_line <= self.BEYOND_M:
             return ()
         ran = self._entered and not self._stopped and to_line > 0.0
-        self._target, self._left = None, _line_middle(sign)
+        self._target, self._left = None, _middle(sign)
         if not ran:
             return ()
         text = f"Agent ran a stop with id={sign.id} at {_place(sign.x_m, sign.y_m)}"
@@ -336,7 +331,7 @@ class StopSigns:
             sign
             for sign in observation.signs
             if sign.kind == "stop" and math.hypot(sign.x_m - ego.x_m, sign.y_m - ego.y_m) <= 50.0
-            if self._left is None or math.dist(_line_middle(sign), self._left) > self.ONE_LINE_M
+            if self._left is None or math.dist(_middle(sign), self._left) > self.ONE_LINE_M
         ]
         if not signs:
             return None
@@ -477,20 +472,16 @@ def _place(x_m: float, y_m: float) -> str:
     return f"(x={x_m:.3f}, y={-y_m:.3f}, z=0.0)"
 
 
-def _middle(signal: Signal) -> tuple[float, float]:
-    (ax, ay), (bx, by) = signal.stop_line_m
-    return (ax + bx) / 2.0, (ay + by) / 2.0
-
-
-def _line_middle(sign: Sign) -> tuple[float, float]:
-    if sign.stop_line_m is None:
-        return sign.x_m, sign.y_m
-    (ax, ay), (bx, by) = sign.stop_line_m
+def _middle(ruling: Signal | Sign) -> tuple[float, float]:
+    """Of the stop line of a light or sign; where the sign itself stands, if it has none."""
+    if ruling.stop_line_m is None:
+        return ruling.x_m, ruling.y_m
+    (ax, ay), (bx, by) = ruling.stop_line_m
     return (ax + bx) / 2.0, (ay + by) / 2.0
 
 
 def _station(sign: Sign, lane: Lane) -> float:
-    return max(0.0, min(lane.length_m, lane.centre.nearest(*_line_middle(sign))))
+    return max(0.0, min(lane.length_m, lane.centre.nearest(*_middle(sign))))
 
 
 def _past_line(sign: Sign, road: RoadGraph, ego: VehicleState) -> float:

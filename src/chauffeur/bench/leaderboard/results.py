@@ -7,7 +7,6 @@ import math
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -174,13 +173,8 @@ def write_official(
     path.write_text(json.dumps(official(rows, infractions), indent=4, sort_keys=True) + "\n")
 
 
-def infraction_rows(infractions: Iterable[Infraction]) -> list[dict[str, Any]]:
-    """Infractions as JSON."""
-    return [asdict(one) for one in infractions]
-
-
 def infractions_of(rows: Iterable[Mapping[str, Any]]) -> tuple[Infraction, ...]:
-    """Infractions from JSON."""
+    """Infractions as they are stored of a drive."""
     return tuple(Infraction(**row) for row in rows)
 
 

@@ -88,9 +88,9 @@ class DrivenRoute:
     length_m: float
 
 
-def mean_score(routes: Sequence[DrivenRoute], planned: int | None = None) -> RouteScore:
-    """Means over the planned routes; one that was not driven counts as 0 in all three, as in the official file."""
-    count = planned or len(routes)
+def mean_score(routes: Sequence[DrivenRoute]) -> RouteScore:
+    """Means over the routes; one that was not driven counts as 0 in all three, as in the official file."""
+    count = len(routes)
     if not count:
         return RouteScore(0.0, 0.0, 0.0)
     return RouteScore(

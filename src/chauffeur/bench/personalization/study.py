@@ -84,7 +84,6 @@ class StudyJob:
 
     @property
     def id(self) -> str:
-        """See BenchItem: a sitting is asked for, and done, by itself."""
         return self.key
 
     @property
@@ -94,7 +93,7 @@ class StudyJob:
 
     def run(self) -> Row:
         """All trips, as one row. Raises ChauffeurError: an endpoint that does not answer is no takeover."""
-        return asyncio.run(sit(self))
+        return asyncio.run(_Sitting(self).row())
 
     def spoiled(self, detail: str) -> Row:
         return {"key": self.key, "infra_failed": True, "detail": detail}
@@ -109,11 +108,6 @@ def versions() -> dict[str, str]:
         "trace": TRACE_VERSION,
         "ride": RIDE_VERSION,
     }
-
-
-async def sit(job: StudyJob) -> Row:
-    """All trips of one passenger for one task, as one row, where a loop runs already."""
-    return await _Sitting(job).rows()
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +128,8 @@ class _Sitting:
         self._rng = np.random.default_rng([job.seed, job.number, TASKS.index(job.task), 1])
         self._scenes = scenes_of(job.task)
 
-    async def rows(self) -> Row:
-        """The row."""
+    async def row(self) -> Row:
+        """All trips, as one row."""
         job = self._job
         own = planner_of(job.planner, job.options)
         trips: list[Row] = []
