@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from chauffeur.bench.kernel.benchmark import ItemOutcome
+from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, read_routes
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
@@ -91,11 +93,11 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, content: bytes | None) -> 
 
 
 @pytest.mark.parametrize("case", ["routes-leaderboard2", "routes-map-attribute"])
-def test_files_from_the_field_are_driven(tmp_path: Path, case: str, case_folder: Callable[[str], Path]) -> None:
+def test_files_from_the_field_are_driven(case: str, case_folder: Callable[[str], Path]) -> None:
     pytest.importorskip("libsumo", reason="needs the extra `town`")
-    result = run(case_folder(case) / "routes.xml", tmp_path / "run")
-    assert result.exit_code == 0, result.output
-    (row,) = map(json.loads, (tmp_path / "run" / "results.jsonl").read_text().splitlines())
+    bench = LeaderboardBenchmark(str(case_folder(case) / "routes.xml"), "none", seeds=1)
+    (item,) = bench.items()
+    (row,) = bench.rows(ItemOutcome(item, None, "", bench.job(item, None).run()))
     assert row["rc"] > 90.0 and row["simulated_s"] > 0.0
 
 

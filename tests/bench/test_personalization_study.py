@@ -15,10 +15,12 @@ from chauffeur.bench.personalization import figures
 from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
 from chauffeur.bench.personalization.study import ARMS, StudyJob
 
+STUDY = StudyConfig(passengers=1, seed=5, half="tuning", trips=2)
+
 
 @pytest.fixture(scope="module")
 def sitting() -> Row:
-    return StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
+    return StudyJob("p0001.go", 0, "go", STUDY).run()
 
 
 def test_every_system_gets_the_same_words_scenes_and_moods_in_an_order_of_its_own(sitting: Row) -> None:
@@ -44,7 +46,7 @@ def test_memory_learns_in_the_trips_before_and_from_none_that_measures(sitting: 
 
 
 def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
-    again = StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
+    again = StudyJob("p0001.go", 0, "go", STUDY).run()
 
     def timeless(row: Row) -> list[Row]:
         return [{name: value for name, value in trip.items() if name != "latency_s"} for trip in row["trips"]]
@@ -53,7 +55,7 @@ def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
 
 
 def test_rows_say_that_nobody_was_asked(sitting: Row) -> None:
-    bench = StudyBenchmark(StudyConfig(passengers=1, seed=5, half="tuning", trips=2))
+    bench = StudyBenchmark(STUDY)
     item = next(one for one in bench.items() if one.task == "go")
     rows = bench.rows(ItemOutcome(item, None, "", sitting))
     assert len(rows) == 2 + 3 * len(ARMS)

@@ -59,6 +59,25 @@ def arms_of(task: Task) -> tuple[Arm, ...]:
 
 
 @dataclass(frozen=True, slots=True)
+class StudyConfig:
+    """What decides a run.
+
+    Attributes:
+        passengers: How many simulated people.
+        seed: They, their moods and their words are drawn from it.
+        planner: Who plans without and with memory.
+        half: Which half of the wordings is said.
+        trips: How many trips the memory learns from, for each task.
+    """
+
+    passengers: int = 100
+    seed: int = 1
+    planner: str = "talk2drive"
+    half: Half = "test"
+    trips: int = 5
+
+
+@dataclass(frozen=True, slots=True)
 class StudyJob:
     """One passenger, one task.
 
@@ -66,20 +85,14 @@ class StudyJob:
         key: E.g. `p0007.overtake`.
         number: The passenger's, from 0.
         task: What for.
-        seed: Of the study.
-        planner: Who plans without and with memory.
-        half: Which wordings are said.
-        trips: How many trips the memory learns from.
+        study: What decides the run.
         options: Of the planner.
     """
 
     key: str
     number: int
     task: Task
-    seed: int
-    planner: str
-    half: Half
-    trips: int
+    study: StudyConfig
     options: tuple[tuple[str, Any], ...] = ()
 
     @property
@@ -123,19 +136,19 @@ class _Sitting:
     """A passenger with their words, moods and the order of their trips."""
 
     def __init__(self, job: StudyJob) -> None:
-        self._job = job
-        self._passenger = draw_passengers(job.number + 1, job.seed)[job.number]
-        self._rng = np.random.default_rng([job.seed, job.number, TASKS.index(job.task), 1])
+        self._job, self._study = job, job.study
+        self._passenger = draw_passengers(job.number + 1, job.study.seed)[job.number]
+        self._rng = np.random.default_rng([job.study.seed, job.number, TASKS.index(job.task), 1])
         self._scenes = scenes_of(job.task)
 
     async def row(self) -> Row:
         """All trips, as one row."""
         job = self._job
-        own = planner_of(job.planner, job.options)
+        own = planner_of(self._study.planner, job.options)
         trips: list[Row] = []
         with learning(self._passenger) as (vault, person, end_day):
             memory = RecentToo(vault)
-            for number in range(1, job.trips + 1):
+            for number in range(1, self._study.trips + 1):
                 day = self._day(LEVELS[int(self._rng.integers(len(LEVELS)))])
                 done = await ride(own, memory, day.words, person, job.task, day.scene, _LIMITS)
                 found = judge(done.trace, self._passenger, day.mood)
@@ -160,7 +173,7 @@ class _Sitting:
                         done = await ride(planner, recalls, day.words, who, job.task, day.scene, _LIMITS)
                         trace, plan = done.trace, _planned(done, "measured", "")
                     found = judge(trace, self._passenger, day.mood)
-                    trips.append(self._row(arm, day, job.trips + 1, place, trace, found) | plan)
+                    trips.append(self._row(arm, day, self._study.trips + 1, place, trace, found) | plan)
         row: Row = {"key": job.key, "infra_failed": False, "passenger": self._passenger.id, "task": job.task}
         return row | {"trips": trips}
 
@@ -170,7 +183,7 @@ class _Sitting:
         start, limit = _start(job.task, scene.id)
         aim = aim_of(passenger, job.task, int(rng.integers(3)), start, limit)
         pace = float(1.0 + passenger.noise * rng.normal())
-        words = wishes_of(aim, level, job.half)
+        words = wishes_of(aim, level, self._study.half)
         return _Day(Mood(job.task, aim, level, pace), scene, words[int(rng.integers(len(words)))])
 
     def _ideal(self, day: _Day) -> Parameters:
@@ -191,7 +204,7 @@ class _Sitting:
     def _say(self, found: Judgement, mood: Mood) -> str:
         """Feedback after a drive, in words of their own; empty where they say nothing."""
         choice = mood.aim.partition(".")[2]  # a place, or a direction of speed
-        words = remark(self._passenger, found, self._job.half, self._rng)
+        words = remark(self._passenger, found, self._study.half, self._rng)
         return words.format(place=PLACE_WORDS.get(choice, "in a free spot"), pace=choice)
 
     def _row(self, arm: Arm, day: _Day, trip: int, place: int, trace: Trace, found: Judgement) -> Row:
