@@ -109,11 +109,8 @@ class RouteDeviation:
         self._track = track
         self._index = 0
         self._away_m = 0.0
-        self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        if self._broken:
-            return ()
         ego, stations = observation.ego, self._track.stations_m
         nearest, closest_m = self._index, math.inf
         for index in range(self._index, min(self._index + self.WINDOW + 1, len(stations))):
@@ -126,10 +123,7 @@ class RouteDeviation:
             self._away_m += stations[nearest] - stations[self._index]
             off = off or self._away_m > self.SHARE * stations[-1]
         self._index = nearest
-        if not off:
-            return ()
-        self._broken = True
-        return (_at_ego("route_dev", observation, "Agent deviated from the route at {place}"),)
+        return (_at_ego("route_dev", observation, "Agent deviated from the route at {place}"),) if off else ()
 
 
 class Blocked:
@@ -163,13 +157,10 @@ class Timeout:
     def __init__(self, limit_s: float) -> None:
         """Watch the clock."""
         self._limit_s = limit_s
-        self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        if self._broken or observation.time_s <= self._limit_s:
-            return ()
-        self._broken = True
-        return (_at_ego("route_timeout", observation, "Route timeout."),)
+        late = observation.time_s > self._limit_s
+        return (_at_ego("route_timeout", observation, "Route timeout."),) if late else ()
 
 
 _COLLISION: Final[dict[str, InfractionKind]] = {
@@ -451,7 +442,9 @@ class RouteReferee:
         self.done = False
 
     def update(self, observation: Observation) -> list[Infraction]:
-        """What was broken at this instant; `done` is set where the route has ended."""
+        """What was broken at this instant, nothing after the end; `done` is set where the route has ended."""
+        if self.done:
+            return []
         found = [one for criterion in self._criteria for one in criterion.update(observation)]
         self.infractions += found
         self.done = self.completion.completed or any(one.kind in ENDING for one in found)
