@@ -160,11 +160,13 @@ def test_own_routes_are_the_same_every_time_and_lie_in_all_own_towns() -> None:
 
 
 def test_jobs_differ_by_all_that_decides_them() -> None:
-    keys = set()
-    for driver, density in (("expert", 1.0), ("reckless", 1.0), ("expert", 0.5)):
-        bench = LeaderboardBenchmark("own", driver=driver, density=density, seeds=2, limit=2)
-        keys |= {bench.job(item, None).key for item in bench.items()}
-    assert len(keys) == 12
+    onboard = {"driver": "onboard", "latency_s": 0.1}
+    runs: tuple[dict[str, Any], ...] = (
+        {}, {"driver": "reckless"}, {"density": 0.5}, onboard, onboard | {"latency_s": 0.2},
+        onboard | {"setting": "zero-shot"},
+    )  # fmt: skip
+    benches = [LeaderboardBenchmark("own", seeds=2, limit=2, **options) for options in runs]
+    assert len({bench.job(item, None).key for bench in benches for item in bench.items()}) == 4 * len(runs)
 
 
 @pytest.mark.parametrize(
@@ -178,17 +180,12 @@ def test_seeds_are_counted_or_named(given: int | str, seeds: list[int]) -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {"driver": "nobody"},
-        {"scenarios": "eleven"},
-        {"seeds": 0},
-        {"seeds": "11,11"},
-        {"seeds": "-1"},
-        {"seeds": "a,b"},
-        {"seeds": ""},
-        {"towns": "Atlantis"},
-        {"scoring": "lb9"},
+        {"driver": "nobody"}, {"scenarios": "eleven"}, {"towns": "Atlantis"}, {"scoring": "lb9"}, {"density": -1.0},
+        {"seeds": 0}, {"seeds": "11,11"}, {"seeds": "-1"}, {"seeds": "a,b"}, {"seeds": ""},
+        {"driver": "onboard", "setting": "by-heart"}, {"driver": "onboard", "repository": "."},
+        {"driver": "onboard", "latency_s": -1.0},
     ],
-)
+)  # fmt: skip
 def test_options_that_cannot_be_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         LeaderboardBenchmark(**options)
@@ -209,5 +206,4 @@ def test_traffic_is_the_official_number_where_the_lanes_are_long_enough() -> Non
 
 def test_a_route_that_came_from_another_map_is_said() -> None:
     route = LeaderboardRoute("9", "Gridford", (Pose(5e3, 5e3, 0.0), Pose(5e3, 5e3, 0.0)))
-    found = RouteJob("k", route, (), "expert", 0, 1.0).run()
-    assert found["status"] == "Failed - Route cannot be set up"
+    assert RouteJob("k", route, (), "expert", 0, 1.0).run()["status"] == "Failed - Route cannot be set up"

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from chauffeur.bench.kernel.benchmark import ItemOutcome
+from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, read_routes
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
@@ -70,21 +72,32 @@ def test_a_way_that_is_none_is_a_fault_in_words(tmp_path: Path, inside: str, say
     assert says in found.fault and not found.keypoints
 
 
+def test_routes_without_an_id_of_their_own_keep_their_place(tmp_path: Path) -> None:
+    points = OLD.format(x=0, y=0, yaw=0) + OLD.format(x=9, y=0, yaw=0)
+    names = ('id="2"', 'id="2"', "")
+    found = routes(tmp_path, *(f'<route {name} town="Town05">{points}</route>' for name in names))
+    assert [bool(one.fault) for one in found] == [False, True, True]
+    assert len({one.id for one in found}) == 3
+
+
 @pytest.mark.parametrize(
-    "content", [b"", b"[]", b"<routes/>", b'<?xml version="1.0" encoding="x"?><routes/>', b"\0" * 99]
-)
-def test_a_file_that_is_none_is_named(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "routes.xml").write_bytes(content)
+    "content",
+    [b"", b"[]", b"<a", b"<routes/>", b'<!DOCTYPE a [<!ENTITY b "c">]><routes/>',
+     b'<?xml version="1.0" encoding="x"?><routes/>', b"\0" * 99, None],
+)  # fmt: skip
+def test_a_file_that_is_none_is_named(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / "routes.xml").write_bytes(content)
     with pytest.raises(DataError, match=r"routes\.xml"):
         read_routes(tmp_path / "routes.xml")
 
 
 @pytest.mark.parametrize("case", ["routes-leaderboard2", "routes-map-attribute"])
-def test_files_from_the_field_are_driven(tmp_path: Path, case: str, case_folder: Callable[[str], Path]) -> None:
+def test_files_from_the_field_are_driven(case: str, case_folder: Callable[[str], Path]) -> None:
     pytest.importorskip("libsumo", reason="needs the extra `town`")
-    result = run(case_folder(case) / "routes.xml", tmp_path / "run")
-    assert result.exit_code == 0, result.output
-    (row,) = map(json.loads, (tmp_path / "run" / "results.jsonl").read_text().splitlines())
+    bench = LeaderboardBenchmark(str(case_folder(case) / "routes.xml"), "none", seeds=1)
+    (item,) = bench.items()
+    (row,) = bench.rows(ItemOutcome(item, None, "", bench.job(item, None).run()))
     assert row["rc"] > 90.0 and row["simulated_s"] > 0.0
 
 

@@ -21,7 +21,7 @@ from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
 from chauffeur.bench.leaderboard.own_routes import own_routes
 from chauffeur.bench.leaderboard.rollout import RouteJob
 from chauffeur.bench.leaderboard.ways import plan_official
-from chauffeur.concept import ConfigError, Limits, Plan, PlanRequest, Program, Scenario, Thoughts
+from chauffeur.concept import Limits, Plan, PlanRequest, Program, Scenario, Thoughts
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.worlds.town.library import load
@@ -41,17 +41,8 @@ def job(endpoint: ModelServer, setting: str, limit_s: float, **spec: object) -> 
     file, triggers = own_routes(("Gridford",))
     options = (("base_url", endpoint.url), ("cache", False))
     planner = PlannerSpec("openai/m", setting, latency_s=2.0, options=options, **spec)  # type: ignore[arg-type]
-    return RouteJob(
-        "k",
-        file.routes[0],
-        triggers.towns["Gridford"],
-        "openai/m",
-        3,
-        0.2,
-        limit_s=limit_s,
-        shield=True,
-        planner=planner,
-    )
+    marks = triggers.towns["Gridford"]
+    return RouteJob("k", file.routes[0], marks, "openai/m", 3, 0.2, limit_s=limit_s, shield=True, planner=planner)
 
 
 @pytest.mark.parametrize(("setting", "examples"), [("zero-shot", False), ("few-shot", True)])
@@ -143,17 +134,6 @@ def test_the_car_does_not_wait_for_the_next_plan() -> None:
     assert max(waiting) > 3.0
 
 
-def test_options_that_cannot_be_are_refused(tmp_path: Path) -> None:
-    for options in (
-        {"driver": "nobody"},
-        {"driver": "onboard", "setting": "by-heart"},
-        {"driver": "onboard", "repository": str(tmp_path)},
-        {"driver": "onboard", "latency_s": -1.0},
-    ):
-        with pytest.raises(ConfigError):
-            LeaderboardBenchmark(**options)  # type: ignore[arg-type]
-
-
 def test_without_a_repository_the_programs_that_ship_are_offered(tmp_path: Path) -> None:
     half = (SNIPPETS / "policies.jsonl").read_text("utf-8").splitlines(keepends=True)[::2]
     (tmp_path / "policies.jsonl").write_text("".join(half), "utf-8")
@@ -161,14 +141,6 @@ def test_without_a_repository_the_programs_that_ship_are_offered(tmp_path: Path)
     given = LeaderboardBenchmark(driver="onboard", setting="human-feedback", repository=str(tmp_path))
     assert PolicyRepository(SNIPPETS).digest in shipped
     assert PolicyRepository(tmp_path).digest in given.config["planner"]
-
-
-def test_what_decides_a_result_decides_its_key() -> None:
-    jobs = [
-        LeaderboardBenchmark(driver="onboard", latency_s=latency, setting=setting, seeds=1)
-        for latency, setting in ((0.1, "few-shot"), (0.2, "few-shot"), (0.1, "zero-shot"))
-    ]
-    assert len({one.job(one.items()[0], None).key for one in jobs}) == 3
 
 
 def test_the_papers_rows_never_stand_alone_with_ours() -> None:

@@ -1,4 +1,4 @@
-"""Route and trigger files, and the ten scenarios on a stage that only writes down what happens on it."""
+"""Trigger files, and the ten scenarios on a stage that only writes down what happens on it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chauffeur.bench.leaderboard.routes import read_routes
 from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.bench.leaderboard.triggers import Placed, Trigger, place, read_triggers
 from chauffeur.bench.leaderboard.ways import plan_keypoints
-from chauffeur.concept import DataError, ScenarioError, Signal
+from chauffeur.concept import Command, DataError, ScenarioError, Signal
 from chauffeur.geometry import Pose
 
 SHARED_DATA = Path(os.environ.get("CHAUFFEUR_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
@@ -73,29 +73,27 @@ def pass_by(behaviour: Behaviour, stage: Notebook, begin: float = 100.0, end: fl
     return log
 
 
-def test_control_loss_disturbs_from_12_to_42_m_and_then_no_more() -> None:
-    behaviour, _ = start(1, 20)
-    felt = []
+def disturbances(behaviour: Behaviour, begin: float) -> list[tuple[float, Command]]:
+    """Places along the way at which the ego is disturbed, and how."""
+    felt: list[tuple[float, Command]] = []
     for i in range(300):
-        x = 20.0 + i * 0.4
+        x = begin + i * 0.4
         behaviour.update(seen(i * 0.05, car(0, x), road=ROAD))
-        if behaviour.disturbance is not None:
-            felt.append((x - 20.0, behaviour.disturbance))
-    assert felt[0][0] == pytest.approx(12.0, abs=0.5)
-    assert felt[-1][0] == pytest.approx(42.0, abs=0.5)
+        felt += [] if behaviour.disturbance is None else [(x, behaviour.disturbance)]
+    assert behaviour.done and behaviour.disturbance is None
+    return felt
+
+
+def test_control_loss_disturbs_from_12_to_42_m_and_then_no_more() -> None:
+    felt = disturbances(start(1, 20)[0], 20.0)
+    assert [felt[0][0], felt[-1][0]] == pytest.approx([32.0, 62.0], abs=0.5)
     assert all(one.acceleration_mps2 > 0.0 for _, one in felt)
     assert 0.0 < np.std([one.steering_rad for _, one in felt]) < 0.05
-    assert behaviour.done
-    assert behaviour.disturbance is None
 
 
 def test_control_loss_ends_ten_metres_before_a_junction() -> None:
-    behaviour, _ = start(1, 165)  # 12 m on, 23 m are left to the junction
-    felt = []
-    for i in range(300):
-        behaviour.update(seen(i * 0.05, car(0, 165.0 + i * 0.4), road=ROAD))
-        felt += [165.0 + i * 0.4] if behaviour.disturbance is not None else []
-    assert 188.0 < felt[-1] <= 190.5
+    felt = disturbances(start(1, 165)[0], 165.0)  # 12 m on, 23 m are left to the junction
+    assert 188.0 < felt[-1][0] <= 190.5
 
 
 def test_the_jaywalker_waits_on_the_right_crosses_the_way_and_is_cleared_away() -> None:
@@ -123,9 +121,13 @@ def test_a_cyclist_crosses_behind_the_turn_at_ten_metres_a_second() -> None:
     assert behaviour.done
 
 
-def test_scenario_four_without_a_junction_ahead_cannot_be_placed() -> None:
-    with pytest.raises(ScenarioError, match="Scenario4 needs a junction"):
-        start(4, 260)
+@pytest.mark.parametrize(
+    ("kind", "index", "lacks"),
+    [(4, 260, "a junction"), (7, 260, "a junction"), (6, 190, "a lane"), (6, 290, "60 m of way")],
+)
+def test_what_the_way_lacks_cannot_be_placed(kind: int, index: int, lacks: str) -> None:
+    with pytest.raises(ScenarioError, match=f"Scenario{kind} needs {lacks}"):
+        start(kind, index)
 
 
 @pytest.mark.parametrize(("kind", "cars"), [(2, 1), (5, 2)])
@@ -173,11 +175,6 @@ def test_who_comes_waits_for_an_ego_in_the_way() -> None:
         behaviour.update(seen(i * 0.05, car(0, 60.0, 3.5, speed=0.0), road=ROAD))
         assert all(pose.x_m > 64.0 for kind, pose, _ in stage.there.values() if kind == "car")
     assert any(speed == 0.0 for kind, _, speed in stage.there.values() if kind == "car")
-
-
-def test_an_obstacle_without_a_lane_of_the_other_direction_cannot_be_placed() -> None:
-    with pytest.raises(ScenarioError, match="Scenario6 needs a lane"):
-        start(6, 190)
 
 
 def test_lights_turn_yellow_red_and_back_within_ten_metres() -> None:
@@ -228,34 +225,6 @@ def test_triggers_match_in_place_and_heading_and_the_highest_stands() -> None:
     )
     assert [(one.trigger.scenario, one.turn) for one in found] == [(3, None), (7, "straight")]
     assert [one.trigger.scenario for one in place(TURNING, [Trigger(8, Pose(90.0, 0.0, 0.0))])] == []
-
-
-def test_a_malformed_route_keeps_its_place_and_says_why(tmp_path: Path) -> None:
-    file = tmp_path / "routes.xml"
-    file.write_text(
-        '<routes><route id="0" town="T"><waypoint x="1" y="2" yaw="90"/><waypoint x="1" y="9"/></route>'
-        '<route id="1" town="T"><waypoint x="abc" y="2"/><waypoint x="1" y="9"/></route>'
-        '<route id="2" town="T"><waypoint x="1" y="2"/></route>'
-        '<route id="2" town="T"><waypoint x="1" y="2"/><waypoint x="3" y="2"/></route>'
-        '<route id="3"><waypoint x="nan" y="2"/><waypoint x="3" y="2"/></route></routes>'
-    )
-    routes = read_routes(file).routes
-    assert routes[0].fault == ""
-    assert routes[0].keypoints[0] == Pose(1.0, -2.0, -math.pi / 2.0)
-    assert [bool(one.fault) for one in routes] == [False, True, True, True, True]
-    assert "abc" in routes[1].fault
-    assert "1 waypoints" in routes[2].fault
-    assert len({one.id for one in routes}) == 5
-
-
-@pytest.mark.parametrize("content", ["", "<routes/>", "<a", '<!DOCTYPE a [<!ENTITY b "c">]><routes/>'])
-def test_what_is_no_route_file_is_said(tmp_path: Path, content: str) -> None:
-    file = tmp_path / "routes.xml"
-    file.write_text(content)
-    with pytest.raises(DataError, match=r"routes\.xml"):
-        read_routes(file)
-    with pytest.raises(DataError, match="cannot be read"):
-        read_routes(tmp_path / "none.xml")
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"available_scenarios": [{"T": [{"scenario_type": "Scenario99"}]}]}'])

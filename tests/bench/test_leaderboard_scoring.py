@@ -6,10 +6,9 @@ import json
 
 import pytest
 
-from chauffeur.bench.leaderboard.criteria import Infraction, InfractionKind
+from chauffeur.bench.leaderboard.criteria import Infraction
 from chauffeur.bench.leaderboard.results import counted, official, status_of
 from chauffeur.bench.leaderboard.scoring import (
-    DrivenRoute,
     RouteScore,
     mean_score,
     official_rates,
@@ -59,23 +58,25 @@ def test_the_sums_of_two_point_one() -> None:
         penalty(found, "lb3")  # type: ignore[arg-type]
 
 
+def row(
+    item: str, found: list[Infraction], completion: float, length_m: float = 1000.0, *, infra_failed: bool = False
+) -> dict[str, object]:
+    score = route_score(completion, found)
+    return {
+        "item": item, "route": item, "engine": "sumo 1.28", "status": status_of(completion == 1.0, found),
+        "rc": score.route, "ip": score.penalty, "ds": score.composed, **counted(found),
+        "length_m": length_m, "simulated_s": 200.0, "cpu_s": 3.0, "infra_failed": infra_failed,
+    }  # fmt: skip
+
+
 def test_the_driving_score_is_the_mean_of_products() -> None:
-    routes = [
-        DrivenRoute(RouteScore(100.0, 0.5, 50.0), {}, 1000.0),
-        DrivenRoute(RouteScore(50.0, 1.0, 50.0), {}, 1000.0),
-    ]
-    assert mean_score(routes) == RouteScore(75.0, 0.75, 50.0)
-    assert mean_score(routes, planned=4) == RouteScore(37.5, 0.375, 25.0)
+    assert mean_score([row("0", [outside(0.5)], 1.0), row("1", [], 0.5)]) == RouteScore(75.0, 0.75, 50.0)
     assert mean_score([]) == RouteScore(0.0, 0.0, 0.0)
 
 
 def test_rates_a_kilometre_official_and_corrected() -> None:
-    counts: dict[InfractionKind, int] = {"red_light": 2}
-    routes = [
-        DrivenRoute(RouteScore(100.0, 1.0, 100.0), counts, 1000.0),
-        DrivenRoute(RouteScore(50.0, 1.0, 50.0), counts, 2000.0),
-        DrivenRoute(RouteScore(0.0, 1.0, 0.0), counts, 1000.0),
-    ]
+    reds = broke(red_light=2)
+    routes = [row("0", reds, 1.0), row("1", reds, 0.5, 2000.0), row("2", reds, 0.0)]
     assert official_rates(routes)["red_light"] == pytest.approx(2.0 + 2.0)  # summed; nothing of the third
     assert rates(routes)["red_light"] == pytest.approx(6 / 2.0)
     assert rates(routes[2:])["red_light"] is None
@@ -89,37 +90,11 @@ def test_the_words_of_an_end() -> None:
     assert status_of(False, [], "Simulation crashed") == "Failed - Simulation crashed"
 
 
-def row(item: str, found: list[Infraction], completion: float, *, infra_failed: bool = False) -> dict[str, object]:
-    score = route_score(completion, found)
-    return {
-        "item": item,
-        "route": item,
-        "engine": "sumo 1.28",
-        "status": status_of(completion == 1.0, found),
-        "rc": score.route,
-        "ip": score.penalty,
-        "ds": score.composed,
-        **counted(found),
-        "length_m": 1000.0,
-        "simulated_s": 200.0,
-        "cpu_s": 3.0,
-        "infra_failed": infra_failed,
-    }
-
-
 def test_the_official_file_has_the_official_keys_and_the_engine() -> None:
     bad = broke(red_light=1, vehicle_blocked=1)
     found = official([row("0", [], 1.0), row("1", bad, 0.5)], {"1": bad})
     assert json.loads(json.dumps(found)) == found
-    assert set(found) == {
-        "_checkpoint",
-        "chauffeur",
-        "eligible",
-        "entry_status",
-        "labels",
-        "sensors",
-        "values",
-    }
+    assert set(found) == {"_checkpoint", "chauffeur", "eligible", "entry_status", "labels", "sensors", "values"}
     assert found["values"][:3] == ["67.500", "75.000", "0.850"]
     assert len(found["values"]) == len(found["labels"]) == 12
     assert found["entry_status"] == "Finished with agent errors"

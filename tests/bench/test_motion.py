@@ -34,17 +34,15 @@ DRIVE = MotionStatistics(3.0, 4.0, 0.02, 0.4, 1.0, 0.5, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("value", "score"),
-    [(0.9, 0.0), (1.0, 0.0), (1.5, 50.0), (2.0, 100.0), (3.0, 100.0), (3.5, 50.0), (4.0, 0.0), (4.1, 0.0)],
-)
-def test_equation_27(value: float, score: float) -> None:
-    assert parameter_score(value, 1.0, 2.0, 3.0, 4.0) == pytest.approx(score)
-
-
-def test_equation_27_where_a_style_begins_with_the_overall_range() -> None:
-    assert parameter_score(1.0, 1.0, 1.0, 2.0, 4.0) == 100.0
-    assert parameter_score(4.0, 1.0, 3.0, 4.0, 4.0) == 100.0
-    assert parameter_score(0.5, 1.0, 1.0, 2.0, 4.0) == 0.0
+    ("value", "style", "score"),
+    [
+        *((value, (2.0, 3.0), score) for value, score in
+          [(0.9, 0.0), (1.0, 0.0), (1.5, 50.0), (2.0, 100.0), (3.0, 100.0), (3.5, 50.0), (4.0, 0.0), (4.1, 0.0)]),
+        (1.0, (1.0, 2.0), 100.0), (4.0, (3.0, 4.0), 100.0), (0.5, (1.0, 2.0), 0.0),
+    ],
+)  # fmt: skip
+def test_equation_27(value: float, style: tuple[float, float], score: float) -> None:
+    assert parameter_score(value, 1.0, *style, 4.0) == pytest.approx(score)
 
 
 def test_styles_lie_in_the_certified_box_and_mean_what_they_say() -> None:

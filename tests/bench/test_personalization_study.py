@@ -1,31 +1,26 @@
-"""A sitting, a run that resumes, and the figures."""
+"""A sitting, its rows, and the figures."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import pytest
-from small_run import quiet
 
+from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.conformance import faults
-from chauffeur.bench.kernel.engine import Work
 from chauffeur.bench.kernel.report import Line, fill
-from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.kernel.shards import Shard
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization import figures
 from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
-from chauffeur.bench.personalization.study import ARMS, StudyJob, sit
-from chauffeur.concept import ConfigError
+from chauffeur.bench.personalization.study import ARMS, StudyJob
+
+STUDY = StudyConfig(passengers=1, seed=5, half="tuning", trips=2)
 
 
 @pytest.fixture(scope="module")
 def sitting() -> Row:
-    return StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
+    return StudyJob("p0001.go", 0, "go", STUDY).run()
 
 
 def test_every_system_gets_the_same_words_scenes_and_moods_in_an_order_of_its_own(sitting: Row) -> None:
@@ -51,7 +46,7 @@ def test_memory_learns_in_the_trips_before_and_from_none_that_measures(sitting: 
 
 
 def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
-    again = StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
+    again = StudyJob("p0001.go", 0, "go", STUDY).run()
 
     def timeless(row: Row) -> list[Row]:
         return [{name: value for name, value in trip.items() if name != "latency_s"} for trip in row["trips"]]
@@ -59,28 +54,13 @@ def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
     assert timeless(again) == timeless(sitting)
 
 
-class _Here:
-    """An engine of one worker: this process. It gives up after `most` jobs, as a machine that is switched off."""
-
-    slots = 1
-
-    def __init__(self, most: int) -> None:
-        self._left = most
-        self._one_at_a_time = asyncio.Lock()
-
-    async def start(self) -> None:
-        return
-
-    async def run(self, work: Work, job: Any, *, near: str = "", urgent: bool = False) -> Row:
-        del work, near, urgent
-        async with self._one_at_a_time:
-            if not self._left:
-                raise KeyboardInterrupt
-            self._left -= 1
-            return await sit(job)
-
-    def close(self, *, now: bool) -> None:
-        del now
+def test_rows_say_that_nobody_was_asked(sitting: Row) -> None:
+    bench = StudyBenchmark(STUDY)
+    item = next(one for one in bench.items() if one.task == "go")
+    rows = bench.rows(ItemOutcome(item, None, "", sitting))
+    assert len(rows) == 2 + 3 * len(ARMS)
+    assert all("simulated" in row["note"] for row in rows)
+    assert figures.headline(rows).startswith("1 simulated passengers")
 
 
 class _Quick(StudyBenchmark):
@@ -90,46 +70,8 @@ class _Quick(StudyBenchmark):
         return [job for job in super().items() if job.task == "go"]
 
 
-def _opened(folder: Path, passengers: int = 2) -> BenchRun:
-    return BenchRun(folder, _Quick(StudyConfig(passengers=passengers, seed=5, half="tuning", trips=0)))
-
-
-def _done(run: BenchRun) -> int:
-    return len(run.stages.rollouts.rows)
-
-
-def _able(jobs: int) -> Effort:
-    return Effort(engine=lambda workers: _Here(jobs))
-
-
-def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_path: Path) -> None:
-    folder = tmp_path / "run"
-    with pytest.raises(KeyboardInterrupt):
-        _opened(folder).run(quiet, _able(1))
-    assert _done(_opened(folder)) == 1
-    rows = _opened(folder).run(quiet, _able(1))
-    assert _done(_opened(folder)) == 2
-    again = _opened(folder).run(quiet, _able(0))
-    assert again == rows
-    assert len(rows) == 2 * 3 * len(ARMS)
-    assert all("simulated" in row["note"] for row in rows)
-    with pytest.raises(ConfigError, match="another configuration"):
-        _opened(folder, 3)
-    assert "Simulated passengers" in (folder / "table.md").read_text()
-    assert figures.headline(rows).startswith("2 simulated passengers")
-
-
 def test_it_conforms() -> None:
     assert faults(_Quick(StudyConfig(passengers=1, seed=5, half="tuning", trips=1))) == []
-
-
-def test_shards_share_the_work(tmp_path: Path) -> None:
-    config = StudyConfig(passengers=3, seed=5, trips=0)
-    bench = StudyBenchmark(config)
-    parts = [BenchRun(tmp_path / str(number), bench, shard=Shard(number, 3)).items for number in (1, 2, 3)]
-    keys = [job.key for jobs in parts for job in jobs]
-    assert sorted(keys) == sorted(job.key for job in bench.items())
-    assert len(set(keys)) == 21
 
 
 def _rows(persons: int, before: int, after: int) -> list[Row]:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import os
-import pty
 import re
-import select
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,14 +16,17 @@ from typer.testing import CliRunner
 sys.path.append(str(Path(__file__).resolve().parents[1] / "bench"))
 
 from coached_data import DESCRIPTION, GO_LEFT, IDLE, USE_IT, make_data, reply, server_module
+from terminal import WITHIN_S, at_a_terminal, until
 
 from chauffeur.cli.main import app
 from chauffeur.memory.policies import PolicyRepository
 
 MODEL = server_module()
 stream = MODEL.stream
-# The terminal becomes the command's own, so that Ctrl-C typed there reaches it.
-RUN = "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); from chauffeur.cli.main import run; run()"
+# A test run started in the background has Ctrl-C ignored, and its children would inherit that.
+RUN = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from chauffeur.cli.main import run; run()"
+)
 COMMAND = [sys.executable, "-c", RUN, "bench", "coach"]
 
 
@@ -51,84 +50,31 @@ def plain(text: str) -> str:
     return " ".join(re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text).split())
 
 
-class Terminal:
-    """A command on a pseudo-terminal."""
-
-    def __init__(self, arguments: list[str]) -> None:
-        self._terminal, inner = pty.openpty()
-        self.process = subprocess.Popen(
-            [*COMMAND, *arguments],
-            stdin=inner,
-            stdout=inner,
-            stderr=inner,
-            start_new_session=True,
-            # A test run started in the background has Ctrl-C ignored, and its children would inherit that.
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads here
-        )
-        os.close(inner)
-        self.text = ""
-
-    def until(self, words: str, seconds: float = 90.0) -> None:
-        deadline = time.monotonic() + seconds
-        while words not in plain(self.text):
-            ready, _, _ = select.select([self._terminal], [], [], max(0.0, deadline - time.monotonic()))
-            assert ready, self.text
-            try:
-                self.text += os.read(self._terminal, 65536).decode(errors="replace")
-            except OSError:  # the other end is closed
-                assert words in plain(self.text), self.text
-        # What is waited for next comes after this.
-        self.seen, self.text = self.text, ""
-
-    def interrupt(self, words: str) -> None:
-        """Ctrl-C, again where nothing comes of it: on a crowded machine a key may come before anybody listens."""
-        for _ in range(3):
-            self.type("\x03")
-            try:
-                self.until(words, 25.0)
-            except AssertionError:
-                continue
-            return
-        raise AssertionError(f"Ctrl-C is not heard: {self.text}")
-
-    def type(self, keys: str) -> None:
-        os.write(self._terminal, keys.encode())
-
-    def end(self) -> int:
-        code = self.process.wait(60)
-        os.close(self._terminal)
-        return code
-
-
 @pytest.mark.server
 @pytest.mark.slow
 def test_a_person_at_the_terminal(server: Any, options: list[str], tmp_path: Path) -> None:
     server.script(stream(reply(IDLE)), stream(reply(GO_LEFT)), stream(DESCRIPTION))
-    terminal = Terminal(options)
-    terminal.until("How was it? success, commit, skip, quit, or say what was wrong >")
-    shown = plain(terminal.seen)
-    assert "critic: person; simulated drives" in shown and "Time or road ran out" in shown and "def idle" in shown
-    assert (tmp_path / "run" / "drives" / "left_lc_s0_c0-1.html").stat().st_size > 10_000
-    terminal.type("You never changed lane.\n")
-    terminal.until("round 2")
-    terminal.until("How was it?")
-    terminal.interrupt("run the same command to go on")  # Ctrl-C while it waits for an answer
-    assert terminal.end() == 130
+    with at_a_terminal([*COMMAND, *options]) as (process, screen):
+        shown = plain(until(process, screen, "How was it? success, commit, skip, quit, or say what was wrong"))
+        assert "critic: person; simulated drives" in shown and "Time or road ran out" in shown and "def idle" in shown
+        assert (tmp_path / "run" / "drives" / "left_lc_s0_c0-1.html").stat().st_size > 10_000
+        os.write(screen, b"You never changed lane.\n")
+        assert "round 2" in until(process, screen, "How was it?")
+        process.send_signal(signal.SIGINT)  # while it waits for an answer
+        until(process, screen, "run the same command to go on")
+        assert process.wait(WITHIN_S) == 130
     assert "The passenger says: You never changed lane." in server.requests[1].body["messages"][-1]["content"]
 
-    terminal = Terminal(options)
-    terminal.until("How was it?")
-    assert "Done as asked" in plain(terminal.seen) and "Changed lane to the left." in plain(terminal.seen)
-    terminal.type("success\n")
-    terminal.until("kept as go_left()")
-    assert terminal.end() == 0
+    with at_a_terminal([*COMMAND, *options]) as (process, screen):
+        shown = plain(until(process, screen, "How was it?"))
+        assert "Done as asked" in shown and "Changed lane to the left." in shown
+        os.write(screen, b"success\n")
+        until(process, screen, "kept as go_left()")
+        assert process.wait(WITHIN_S) == 0
     assert len(server.requests) == 3, "nothing is asked for twice"
     (entry,) = PolicyRepository(tmp_path / "policies").entries
-    assert (entry.judged_by, entry.critiques, entry.description) == (
-        "person",
-        ("You never changed lane.",),
-        DESCRIPTION,
-    )
+    assert (entry.judged_by, entry.critiques) == ("person", ("You never changed lane.",))
+    assert entry.description == DESCRIPTION
 
 
 @pytest.mark.server

@@ -7,7 +7,7 @@ import asyncio
 import numpy as np
 import pytest
 
-from chauffeur.bench.leaderboard.lessons import navigator_of
+from chauffeur.bench.leaderboard.instructed import navigator_of
 from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Program, Situation, SystemMessage
 from chauffeur.describe.navigation import NavigationInstruction
 from chauffeur.geometry import LanePlace, Turn, plan_route

@@ -9,6 +9,7 @@ repository, where the next items find it. Every attempt is on disk before the ne
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import json
 import math
@@ -28,6 +29,7 @@ from chauffeur.bench.lampilot.policy_aid import offer
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import (
     ChauffeurError,
+    Context,
     DataError,
     Instruction,
     Limits,
@@ -44,7 +46,7 @@ from chauffeur.drive.planning import checked, screened_request
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.session import drive_program, make_trip, make_world, scenario_hash
 from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
-from chauffeur.memory.policies_entry import Describer, PolicyEntry, content_id, fitting_name
+from chauffeur.memory.policies_entry import Describer, Judge, PolicyEntry, content_id, fitting_name
 from chauffeur.planners.base import Planner, Writer
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, description_messages
 from chauffeur.planners.prompts.blocks import FEEDBACK_CHARS
@@ -108,12 +110,66 @@ def items_named(dataset: Dataset, ids: Sequence[str]) -> tuple[Item, ...]:
     return tuple(known[one] for one in ids)
 
 
-def _silent(event: str, value: Any) -> None:
-    del event, value
+def fallback_description(command: str) -> tuple[str, Describer]:
+    """A description where no model gave a usable one, and its describer."""
+    return FALLBACK_WORDS.format(command=command[:400]), "fallback"
 
 
-def _utc_now() -> datetime:
-    return datetime.now(UTC)
+def learned_entry(
+    plan: Plan,
+    command: str,
+    context: Context,
+    describe_program: Callable[[str], tuple[str, Describer]],
+    *,
+    scenario: str,
+    item: str,
+    judge: Judge,
+    critiques: Sequence[str],
+    learned: datetime,
+    outcome: str = "success",
+    metrics: tuple[tuple[str, float], ...] = (),
+) -> PolicyEntry:
+    """An entry for a plan's program that did well, with the library functions that it calls written into it.
+
+    Args:
+        plan: Holds the program.
+        command, context: What was wished, and the situation then.
+        describe_program: Gives the description of the entry's source, and its describer.
+        scenario, item: Where it was learned.
+        judge: Who said that it did well.
+        critiques: What was said of the attempts before; the last ones are kept.
+        learned: The present time.
+        outcome, metrics: Of its drive.
+
+    Raises:
+        ProgramError: The program cannot stand by itself.
+    """
+    assert isinstance(plan.policy, Program)
+    world = context.situation.world
+    name = fitting_name(main_name(plan.policy.source), world)
+    source = standalone(plan.policy.source, name, plan.policy.library)
+    description, by = describe_program(source)
+    return PolicyEntry(
+        id=content_id(source, command, context.text, scenario, judge, plan.planner, plan.model),
+        name=name,
+        version=1,
+        description=description,
+        described_by=by,
+        source=source,
+        command=command,
+        context=context.text,
+        world=world,
+        scenario=scenario,
+        item=item,
+        outcome=outcome,
+        metrics=metrics,
+        judged_by=judge,
+        critiques=tuple(words[:FEEDBACK_CHARS] for words in critiques[-_CRITIQUES:]),
+        planner=plan.planner,
+        model=plan.model,
+        learned=learned.isoformat(timespec="seconds"),
+        chauffeur=version("chauffeur"),
+    )
 
 
 @dataclass(slots=True)
@@ -137,8 +193,8 @@ class Coach:
     critic: Critic
     limits: Limits
     rounds: int = 5
-    tell: Tell = _silent
-    now: Callable[[], datetime] = _utc_now
+    tell: Tell = lambda _event, _value: None
+    now: Callable[[], datetime] = lambda: datetime.now(UTC)
     _log: RowStore = field(init=False)
 
     def coach(self, items: Sequence[Item]) -> tuple[Coached, ...]:
@@ -292,55 +348,33 @@ class Coach:
         Raises:
             ProgramError: Its program cannot stand by itself.
         """
-        trip, item = attempt.recorded.trip, attempt.item
-        policy = trip.plan.policy
-        assert isinstance(policy, Program)
-        name = fitting_name(main_name(policy.source))
-        source = standalone(policy.source, name, policy.library)
-        description, by, usage = self._description(item.command, trip.context.text, source, runner)
-        metrics = tuple((m.id, m.value) for m in trip.metrics if m.applies and math.isfinite(m.value))
-        judge = self.critic.judge_id
-        entry = PolicyEntry(
-            id=content_id(
-                source, item.command, trip.context.text, item.scenario.id, judge, trip.plan.planner, trip.plan.model
-            ),
-            name=name,
-            version=1,
-            description=description,
-            described_by=by,
-            source=source,
-            command=item.command,
-            context=trip.context.text,
-            world=trip.context.situation.world,
+        trip, item, usage = attempt.recorded.trip, attempt.item, Usage()
+
+        def described(source: str) -> tuple[str, Describer]:
+            nonlocal usage
+            if isinstance(self.planner, Writer):
+                messages = description_messages(item.command, trip.context.text, source)
+                with contextlib.suppress(PlannerError):
+                    prose = runner.run(self.planner.write(messages))
+                    usage = prose.usage
+                    if prose.whole and (words := usable_description(prose.text)):
+                        return words, "model"
+            return fallback_description(item.command)
+
+        entry = learned_entry(
+            trip.plan,
+            item.command,
+            trip.context,
+            described,
             scenario=item.scenario.id,
             item=item.id,
+            judge=self.critic.judge_id,
+            critiques=critiques,
+            learned=self.now(),
             outcome=trip.outcome,
-            metrics=metrics,
-            judged_by=judge,
-            critiques=tuple(words[:FEEDBACK_CHARS] for words in critiques[-_CRITIQUES:]),
-            planner=trip.plan.planner,
-            model=trip.plan.model,
-            learned=self.now().isoformat(timespec="seconds"),
-            chauffeur=version("chauffeur"),
+            metrics=tuple((m.id, m.value) for m in trip.metrics if m.applies and math.isfinite(m.value)),
         )
         return entry, usage
-
-    def _description(
-        self, command: str, context: str, source: str, runner: asyncio.Runner
-    ) -> tuple[str, Describer, Usage]:
-        """Description, who wrote it, and what that cost."""
-        usage = Usage()
-        if isinstance(self.planner, Writer):
-            try:
-                prose = runner.run(self.planner.write(description_messages(command, context, source)))
-            except PlannerError:
-                prose = None
-            if prose is not None:
-                usage = prose.usage
-                words = usable_description(prose.text) if prose.whole else ""
-                if words:
-                    return words, "model", usage
-        return FALLBACK_WORDS.format(command=command[:400]), "fallback", usage
 
     # What is on disk -------------------------------------------------------------------------------------------
 

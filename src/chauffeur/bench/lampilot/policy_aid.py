@@ -34,6 +34,7 @@ def offer(
     critique: str = "",
     also: Collection[str] = (),
     k: int = RECALLED,
+    chain_of_thought: bool = False,
 ) -> tuple[SystemMessage, tuple[PolicyEntry, ...]]:
     """S for a wish, and the entries it offers.
 
@@ -45,12 +46,16 @@ def offer(
         critique: What was said of the last attempt, if there was one.
         also: Names of programs to offer in any case, before the others.
         k: How many programs at most.
+        chain_of_thought: Ask for numbered reasoning before the program.
     """
     wanted = [entry for entry in repository.entries if entry.callable_name in also]
     near = [one.entry for one in repository.recall(command, world, k + len(wanted), critique=critique)]
     entries = (*wanted, *(entry for entry in near if entry not in wanted))[: max(k, len(wanted))]
     helpers = [Helper(e.callable_name, e.description, e.command, e.callable_source) for e in entries]
-    return build_coached_message(helpers, limits=limits, vocabulary=vocabulary_of(world)), entries
+    system = build_coached_message(
+        helpers, limits=limits, vocabulary=vocabulary_of(world), chain_of_thought=chain_of_thought
+    )
+    return system, entries
 
 
 class PolicyAid:

@@ -14,6 +14,7 @@ from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError
 from chauffeur.geometry import RoadGraph
+from chauffeur.worlds.town.library import load
 
 WIDE_PX: Final = 900
 _MARGIN_M: Final = 30.0
@@ -123,8 +124,6 @@ def write_artefacts(
         name = str(row["item"])
         route = benchmark.route_of(items[name])
         try:
-            from chauffeur.worlds.town.library import load
-
             town = load(route.town)
             track = plan_official(town, route).track
         except (ChauffeurError, IndexError):

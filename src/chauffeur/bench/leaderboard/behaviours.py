@@ -8,15 +8,17 @@ one's own.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import islice
 from typing import Final, Protocol
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.track import RouteTrack
+from chauffeur.bench.leaderboard.track import TURNS, RouteTrack
 from chauffeur.bench.leaderboard.triggers import REACHED_M, Placed
-from chauffeur.concept import Command, Observation, ScenarioError
+from chauffeur.concept import Command, Observation, ScenarioError, SignalState
 from chauffeur.geometry import Lane, LanePlace, Polyline, Pose, RoadGraph, joined, wrap_to_pi
 from chauffeur.worlds.base import Stage
 
@@ -46,12 +48,49 @@ class Behaviour(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class _Site:
+    """Where a scenario is set off, and with what."""
+
+    placed: Placed
+    track: RouteTrack
+    road: RoadGraph
+    stage: Stage
+    rng: np.random.Generator
+
+    @property
+    def name(self) -> str:
+        return f"Scenario{self.placed.trigger.scenario}"
+
+    @property
+    def station_m(self) -> float:
+        """Where along the way its trigger lies."""
+        return self.placed.station_m(self.track)
+
+    def junction(self) -> int:
+        """Index of the first point of the way inside a junction ahead. Raises ScenarioError: there is none."""
+        found = self.track.next_junction(self.placed.index)
+        if found is None:
+            raise ScenarioError(f"{self.name} needs a junction ahead on the way.", hint="Check the trigger's place.")
+        return found
+
+    def lane_at(self, pose: Pose) -> Lane:
+        """The driving lane at a pose. Raises ScenarioError: there is none."""
+        place = self.road.locate(pose.x_m, pose.y_m, pose.heading_rad, ("driving",))
+        if place is None or abs(place.offset_m) > 5.0:
+            raise ScenarioError(
+                f"{self.name} finds no lane at ({pose.x_m:.1f}, {pose.y_m:.1f}).", hint="Check the map."
+            )
+        return self.road[place.lane]
+
+
 class _Running:
     """A scenario with a clock and its road users."""
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._began_s: float | None = None
+        self._last_s: float | None = None
         self._actors: list[int] = []
         self.done = False
         self.disturbance: Command | None = None
@@ -60,6 +99,12 @@ class _Running:
         if self._began_s is None:
             self._began_s = observation.time_s
         return observation.time_s - self._began_s
+
+    def _step_s(self, observation: Observation) -> float:
+        """Time since it was last asked for, s; 0 at the first time."""
+        step = 0.0 if self._last_s is None else observation.time_s - self._last_s
+        self._last_s = observation.time_s
+        return step
 
     def _end(self) -> None:
         for actor in self._actors:
@@ -83,15 +128,13 @@ class ControlLoss(_Running):
     LOCK_RAD: Final = math.radians(70.0)
     FULL_THROTTLE_MPS2: Final = 4.0
 
-    def __init__(self, placed: Placed, track: RouteTrack, stage: Stage, rng: np.random.Generator) -> None:
-        super().__init__(stage)
-        self._rng = rng
-        stations = track.stations_m
-        start = placed.station_m(track) + self.AFTER_M
-        junction = next(
-            (s for s, option in zip(stations, track.options, strict=True) if s >= start and option in _TURNING),
-            math.inf,
-        )
+    def __init__(self, site: _Site) -> None:
+        super().__init__(site.stage)
+        self._rng = site.rng
+        stations = site.track.stations_m
+        start = site.station_m + self.AFTER_M
+        index = site.track.next_junction(bisect_left(stations, start))
+        junction = math.inf if index is None else stations[index]
         self._length_m = max(0.0, min(self.LENGTH_M, junction - self.JUNCTION_M - start))
         self._driven_m = 0.0
         self._last: tuple[float, float] | None = None
@@ -133,7 +176,6 @@ class CrossingBehaviour(_Running):
         self._starts_m = starts_m
         self._speed = speed_mps
         self._started = False
-        self._last_s: float | None = None
         actor = stage.spawn("pedestrian" if kind == "pedestrian" else "bicycle", self._pose())
         self._actors = [actor]
 
@@ -149,12 +191,10 @@ class CrossingBehaviour(_Running):
         if not self._started:
             away = math.hypot(ego.x_m - self._at.x_m, ego.y_m - self._at.y_m)
             self._started = away <= self._starts_m + ego.length_m / 2.0
-            self._last_s = observation.time_s
+            self._step_s(observation)
             self._stage.drive(self._actors[0], self._pose(), 0.0)
             return
-        assert self._last_s is not None
-        self._offset += self._speed * (observation.time_s - self._last_s)
-        self._last_s = observation.time_s
+        self._offset += self._speed * self._step_s(observation)
         if self._offset >= self._to_left_m:
             self._end()
             return
@@ -177,19 +217,16 @@ class Leading(_Running):
         """`speeds`: of each car, by its distance ahead of the trigger, m."""
         super().__init__(stage)
         self._track = track
-        self._line = _Line(track)
         self._stations = [start_m + ahead for ahead in speeds]
         self._wished = list(speeds.values())
         self._speeds = list(speeds.values())
         self._brakes_at = [station + brakes_after_m for station in self._stations]
         self._stood_s = 0.0
-        self._last_s: float | None = None
         for station, speed in zip(self._stations, self._speeds, strict=True):
-            self._actors.append(stage.spawn("car", self._line.at(station), speed))
+            self._actors.append(stage.spawn("car", track.at(station), speed))
 
     def update(self, observation: Observation) -> None:
-        step = 0.0 if self._last_s is None else observation.time_s - self._last_s
-        self._last_s = observation.time_s
+        step = self._step_s(observation)
         if self._age_s(observation) > GIVE_UP_S or max(self._stations) > self._track.length_m - 5.0:
             self._end()
             return
@@ -201,7 +238,7 @@ class Leading(_Running):
             else:
                 self._speeds[i] = min(self._wished[i], self._speeds[i] + 2.0 * step)
             self._stations[i] += self._speeds[i] * step
-            self._stage.drive(actor, self._line.at(self._stations[i]), self._speeds[i])
+            self._stage.drive(actor, self._track.at(self._stations[i]), self._speeds[i])
 
 
 class Obstacle(_Running):
@@ -225,7 +262,6 @@ class Obstacle(_Running):
         self._at = at
         self._oncoming = oncoming
         self._flow: dict[int, float] = {}
-        self._last_s: float | None = None
         self._actors = [stage.spawn("static", at)]
 
     def update(self, observation: Observation) -> None:
@@ -234,8 +270,7 @@ class Obstacle(_Running):
             self._actors += self._flow
             self._end()
             return
-        step = 0.0 if self._last_s is None else observation.time_s - self._last_s
-        self._last_s = observation.time_s
+        step = self._step_s(observation)
         way, ego = self._oncoming, observation.ego
         at, aside = way.project(ego.x_m, ego.y_m)
         in_the_way = abs(aside) < (ego.width_m + CAR_WIDTH_M) / 2.0
@@ -287,7 +322,8 @@ class Lights(_Running):
         elif age < self.YELLOW_S + self.RED_S + self.RESET_S:
             self._force((*self._own, *self._meeting), "green")
         else:
-            self._release()
+            self._force(self._junction, None)
+            self._end()
 
     def _wait(self, observation: Observation) -> None:
         ego = observation.ego
@@ -312,14 +348,9 @@ class Lights(_Running):
             self._force(self._own, "yellow")
             return
 
-    def _force(self, signals: tuple[str, ...], state: str) -> None:
+    def _force(self, signals: tuple[str, ...], state: SignalState | None) -> None:
         for signal in signals:
-            self._stage.force_signal(signal, "red" if state == "red" else "yellow" if state == "yellow" else "green")
-
-    def _release(self) -> None:
-        for signal in self._junction:
-            self._stage.force_signal(signal, None)
-        self._end()
+            self._stage.force_signal(signal, state)
 
 
 class Nothing(_Running):
@@ -330,29 +361,13 @@ class Nothing(_Running):
         self._end()
 
 
-_TURNING: Final = ("left", "straight", "right")
-
-
-class _Line:
-    """Poses along a way, between its points and a little beyond its end."""
-
-    def __init__(self, track: RouteTrack) -> None:
-        self._track = track
-        self._stations = np.array(track.stations_m)
-
-    def at(self, station_m: float) -> Pose:
-        last = len(self._track.poses) - 1
-        index = min(max(int(np.searchsorted(self._stations, station_m, side="right")) - 1, 0), last)
-        return self._track.poses[index].ahead(station_m - float(self._stations[index]))
-
-
 def set_off(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
     """Set off a scenario.
 
     Raises:
         ScenarioError: It cannot be placed: the way or the road does not have what it needs.
     """
-    return _MAKERS[placed.trigger.scenario](placed, track, road, stage, rng)
+    return _MAKERS[placed.trigger.scenario](_Site(placed, track, road, stage, rng))
 
 
 def reached(placed: Placed, observation: Observation) -> bool:
@@ -363,65 +378,48 @@ def reached(placed: Placed, observation: Observation) -> bool:
 
 SWITCHES_LIGHTS: Final = (7, 8, 9)
 """Scenarios that take a junction's lights in hand."""
-_Maker = Callable[[Placed, RouteTrack, RoadGraph, Stage, np.random.Generator], Behaviour]
 
 
-def _control_loss(
-    placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator
-) -> Behaviour:
-    del road
-    return ControlLoss(placed, track, stage, rng)
-
-
-def _jaywalker(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
+def _jaywalker(site: _Site) -> Behaviour:
     """12 m ahead on the right, behind a machine, at 3 m/s and 0.4 m/s more for each lane to its right."""
-    at = _Line(track).at(placed.station_m(track) + 12.0)
-    lane = _lane_at(road, at, "Scenario3")
-    right, left = _edges(road, lane, at)
+    at = site.track.at(site.station_m + 12.0)
+    lane = site.lane_at(at)
+    right, left = _edges(site.road, lane, at)
     lanes = max(0, round((right - lane.width_m / 2.0) / lane.width_m))
-    kind = "pedestrian" if rng.random() < 0.5 else "bicycle"
-    crossing = CrossingBehaviour(stage, at, kind, right + 1.0, left + 1.0, 12.0 + lanes, 3.0 + 0.4 * lanes)
+    kind = "pedestrian" if site.rng.random() < 0.5 else "bicycle"
+    crossing = CrossingBehaviour(site.stage, at, kind, right + 1.0, left + 1.0, 12.0 + lanes, 3.0 + 0.4 * lanes)
     x, y = at.place(-1.5, -(right + 1.0))
-    crossing.add(stage.spawn("static", Pose(x, y, at.heading_rad)))
+    crossing.add(site.stage.spawn("static", Pose(x, y, at.heading_rad)))
     return crossing
 
 
-def _after_turn(
-    placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator
-) -> Behaviour:
+def _after_turn(site: _Site) -> Behaviour:
     """A bicycle crosses 8 m behind the junction that the ego turns at, at 10 m/s."""
-    del rng
-    inside = [i for i in range(placed.index, len(track.options)) if track.options[i] in _TURNING]
-    if not inside:
-        raise ScenarioError("Scenario4 needs a junction ahead on the way.", hint="Check the trigger's place.")
-    last = inside[0]
-    while last + 1 < len(track.options) and track.options[last + 1] in _TURNING:
+    last, options = site.junction(), site.track.options
+    while last + 1 < len(options) and options[last + 1] in TURNS:
         last += 1
-    at = _Line(track).at(track.stations_m[last] + 8.0)
-    lane = _lane_at(road, at, "Scenario4")
-    right, left = _edges(road, lane, at)
-    return CrossingBehaviour(stage, at, "bicycle", right + 1.0, left + 1.0, 13.0 + lane.width_m, 10.0)
+    at = site.track.at(site.track.stations_m[last] + 8.0)
+    lane = site.lane_at(at)
+    right, left = _edges(site.road, lane, at)
+    return CrossingBehaviour(site.stage, at, "bicycle", right + 1.0, left + 1.0, 13.0 + lane.width_m, 10.0)
 
 
-def _lead(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
+def _lead(site: _Site) -> Behaviour:
     """A car 25 m ahead at 10 m/s brakes."""
-    del road
-    return Leading(stage, track, placed.station_m(track), {25.0: 10.0}, float(rng.uniform(30.0, 60.0)))
+    return Leading(site.stage, site.track, site.station_m, {25.0: 10.0}, float(site.rng.uniform(30.0, 60.0)))
 
 
-def _leads(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
+def _leads(site: _Site) -> Behaviour:
     """Two cars from 35 m ahead, at 55 km/h and 45 km/h; the second brakes."""
-    del road
     speeds = {35.0: 45.0 / 3.6, 60.0: 55.0 / 3.6}
-    return Leading(stage, track, placed.station_m(track), speeds, float(rng.uniform(40.0, 80.0)))
+    return Leading(site.stage, site.track, site.station_m, speeds, float(site.rng.uniform(40.0, 80.0)))
 
 
-def _obstacle(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
-    del rng
-    station = placed.station_m(track) + Obstacle.AHEAD_M
+def _obstacle(site: _Site) -> Behaviour:
+    track, station = site.track, site.station_m + Obstacle.AHEAD_M
     if station > track.length_m - 10.0:
         raise ScenarioError("Scenario6 needs 60 m of way ahead.", hint="Check the trigger's place.")
-    return Obstacle(stage, _Line(track).at(station), _oncoming(road, _Line(track).at(station + Obstacle.SOURCE_M)))
+    return Obstacle(site.stage, track.at(station), _oncoming(site.road, track.at(station + Obstacle.SOURCE_M)))
 
 
 def _oncoming(road: RoadGraph, at: Pose) -> Polyline:
@@ -436,28 +434,21 @@ def _oncoming(road: RoadGraph, at: Pose) -> Polyline:
     raise ScenarioError("Scenario6 needs a lane whose traffic comes the other way.", hint="Check the trigger's place.")
 
 
-def _lights(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
-    del rng
-    name = f"Scenario{placed.trigger.scenario}"
-    first = next((i for i in range(placed.index, len(track.options)) if track.options[i] in _TURNING), None)
-    if first is None or first == 0:
-        raise ScenarioError(f"{name} needs a junction ahead on the way.", hint="Check the trigger's place.")
-    own = _lane_at(road, track.poses[first - 1], name)
+def _lights(site: _Site) -> Behaviour:
+    road, poses, first = site.road, site.track.poses, site.junction()
+    if first == 0:
+        raise ScenarioError(f"{site.name} needs a way before the junction.", hint="Check the trigger's place.")
+    own = site.lane_at(poses[first - 1])
     if own.junction:
         before = road.predecessors(own.id)
         own = before[0] if before else own
-    crossing = _lane_at(road, track.poses[min(first + 1, len(track.poses) - 1)], name)
+    crossing = site.lane_at(poses[min(first + 1, len(poses) - 1)])
     others = frozenset(before.id for lane in road.conflicts(crossing.id) for before in road.predecessors(lane))
-    return Lights(stage, road, own.id, others - {own.id})
+    return Lights(site.stage, road, own.id, others - {own.id})
 
 
-def _nothing(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
-    del placed, track, road, rng
-    return Nothing(stage)
-
-
-_MAKERS: Final[Mapping[int, _Maker]] = {
-    1: _control_loss,
+_MAKERS: Final[Mapping[int, Callable[[_Site], Behaviour]]] = {
+    1: ControlLoss,
     2: _lead,
     3: _jaywalker,
     4: _after_turn,
@@ -466,15 +457,8 @@ _MAKERS: Final[Mapping[int, _Maker]] = {
     7: _lights,
     8: _lights,
     9: _lights,
-    10: _nothing,
+    10: lambda site: Nothing(site.stage),
 }
-
-
-def _lane_at(road: RoadGraph, pose: Pose, name: str) -> Lane:
-    place = road.locate(pose.x_m, pose.y_m, pose.heading_rad, ("driving",))
-    if place is None or abs(place.offset_m) > 5.0:
-        raise ScenarioError(f"{name} finds no lane at ({pose.x_m:.1f}, {pose.y_m:.1f}).", hint="Check the map.")
-    return road[place.lane]
 
 
 def _edges(road: RoadGraph, lane: Lane, at: Pose) -> tuple[float, float]:

@@ -17,10 +17,11 @@ from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.leaderboard.drivers import DRIVERS
 from chauffeur.bench.leaderboard.instructed import SETTINGS, PlannerSpec
+from chauffeur.bench.leaderboard.own_routes import own_routes
 from chauffeur.bench.leaderboard.results import NOT_DRIVEN, LeaderboardRow, counted, infractions_of
 from chauffeur.bench.leaderboard.rollout import ROUTE_VERSION, RouteJob
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile, read_routes
-from chauffeur.bench.leaderboard.scoring import RouteScore, Scoring, penalty, route_score
+from chauffeur.bench.leaderboard.scoring import RouteScore, Scoring, driven_km, penalty, route_score
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet, read_triggers
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.memory.policies import PolicyRepository
@@ -89,8 +90,8 @@ _COUNTED: Final = ("collisions_pedestrian", "collisions_vehicle", "collisions_la
 
 def _per_km(row: AnyRow) -> tuple[float, ...] | None:
     """(infractions, km driven)."""
-    driven_km = row["rc"] / 100.0 * row["length_m"] / 1000.0
-    return (float(sum(row[name] for name in _COUNTED)), driven_km) if driven_km > 0.0 else None
+    km = driven_km(row)
+    return (float(sum(row[name] for name in _COUNTED)), km) if km > 0.0 else None
 
 
 def _ratio(totals: Array) -> Array:
@@ -340,8 +341,6 @@ def _planner_spec(name: str, setting: str, repository: str, latency_s: float | N
 
 def _files(routes: str, scenarios: str, triggers: str) -> tuple[RouteFile, TriggerSet]:
     if routes == "own":
-        from chauffeur.bench.leaderboard.own_routes import own_routes
-
         file, found = own_routes()
         return file, found if scenarios != "none" else TriggerSet({}, "")
     path = Path(routes)

@@ -12,10 +12,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import version
 from typing import Final
 
-from chauffeur.bench.lampilot.description import FALLBACK_WORDS
+from chauffeur.bench.lampilot.coaching import fallback_description, learned_entry
 from chauffeur.bench.leaderboard.instructed import system_for
 from chauffeur.bench.leaderboard.lessons import Lesson, LessonDrive, LessonResult, lessons_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
@@ -33,9 +32,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.planning import screened_request
 from chauffeur.memory.policies import PolicyRepository
-from chauffeur.memory.policies_entry import PolicyEntry, content_id, fitting_name
 from chauffeur.planners.base import Planner
-from chauffeur.programs.library import main_name, standalone
 
 ROUNDS: Final = 5
 """Attempts at most at a lesson."""
@@ -161,33 +158,19 @@ class TownCoach:
         return TownLesson(lesson, ROUNDS, result.words)
 
     def _kept(self, lesson: Lesson, attempts: int, plan: Plan, context: Context, rounds: Sequence[Round]) -> TownLesson:
-        assert isinstance(plan.policy, Program)
-        name = fitting_name(main_name(plan.policy.source), "town")
-        source = standalone(plan.policy.source, name, plan.policy.library)
         command = lesson.said.text
-        parts = source, command, context.text, lesson.town
-        entry = PolicyEntry(
-            id=content_id(*parts, "evaluator", plan.planner, plan.model),
-            name=name,
-            version=1,
-            description=FALLBACK_WORDS.format(command=command[:400]),
-            described_by="fallback",
-            source=source,
-            command=command,
-            context=context.text,
-            world="town",
-            scenario=lesson.town,
-            item=lesson.id,
-            outcome="success",
-            metrics=(),
-            judged_by="evaluator",
-            critiques=tuple(one.feedback for one in rounds),
-            planner=plan.planner,
-            model=plan.model,
-            learned=datetime.now(UTC).isoformat(timespec="seconds"),
-            chauffeur=version("chauffeur"),
-        )
         try:
+            entry = learned_entry(
+                plan,
+                command,
+                context,
+                lambda _source: fallback_description(command),
+                scenario=lesson.town,
+                item=lesson.id,
+                judge="evaluator",
+                critiques=[one.feedback for one in rounds],
+                learned=datetime.now(UTC),
+            )
             return TownLesson(lesson, attempts, "", self.repository.commit(entry).callable_name)
         except ProgramError as error:
             return TownLesson(lesson, attempts, str(error))

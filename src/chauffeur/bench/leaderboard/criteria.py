@@ -83,11 +83,6 @@ class RouteCompletion:
         """Of the way, 0..1."""
         return 1.0 if self.completed else self._track.stations_m[self._index] / self._track.length_m
 
-    @property
-    def index(self) -> int:
-        """The last point passed."""
-        return self._index
-
     def update(self, observation: Observation) -> Sequence[Infraction]:
         if self.completed:
             return ()
@@ -114,11 +109,8 @@ class RouteDeviation:
         self._track = track
         self._index = 0
         self._away_m = 0.0
-        self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        if self._broken:
-            return ()
         ego, stations = observation.ego, self._track.stations_m
         nearest, closest_m = self._index, math.inf
         for index in range(self._index, min(self._index + self.WINDOW + 1, len(stations))):
@@ -131,10 +123,7 @@ class RouteDeviation:
             self._away_m += stations[nearest] - stations[self._index]
             off = off or self._away_m > self.SHARE * stations[-1]
         self._index = nearest
-        if not off:
-            return ()
-        self._broken = True
-        return (_at_ego("route_dev", observation, "Agent deviated from the route at {place}"),)
+        return (_at_ego("route_dev", observation, "Agent deviated from the route at {place}"),) if off else ()
 
 
 class Blocked:
@@ -168,13 +157,10 @@ class Timeout:
     def __init__(self, limit_s: float) -> None:
         """Watch the clock."""
         self._limit_s = limit_s
-        self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        if self._broken or observation.time_s <= self._limit_s:
-            return ()
-        self._broken = True
-        return (_at_ego("route_timeout", observation, "Route timeout."),)
+        late = observation.time_s > self._limit_s
+        return (_at_ego("route_timeout", observation, "Route timeout."),) if late else ()
 
 
 _COLLISION: Final[dict[str, InfractionKind]] = {
@@ -324,7 +310,7 @@ class StopSigns:
         if -self.AHEAD_M <= to_line <= self.BEYOND_M:
             return ()
         ran = self._entered and not self._stopped and to_line > 0.0
-        self._target, self._left = None, _line_middle(sign)
+        self._target, self._left = None, _middle(sign)
         if not ran:
             return ()
         text = f"Agent ran a stop with id={sign.id} at {_place(sign.x_m, sign.y_m)}"
@@ -336,7 +322,7 @@ class StopSigns:
             sign
             for sign in observation.signs
             if sign.kind == "stop" and math.hypot(sign.x_m - ego.x_m, sign.y_m - ego.y_m) <= 50.0
-            if self._left is None or math.dist(_line_middle(sign), self._left) > self.ONE_LINE_M
+            if self._left is None or math.dist(_middle(sign), self._left) > self.ONE_LINE_M
         ]
         if not signs:
             return None
@@ -456,7 +442,9 @@ class RouteReferee:
         self.done = False
 
     def update(self, observation: Observation) -> list[Infraction]:
-        """What was broken at this instant; `done` is set where the route has ended."""
+        """What was broken at this instant, nothing after the end; `done` is set where the route has ended."""
+        if self.done:
+            return []
         found = [one for criterion in self._criteria for one in criterion.update(observation)]
         self.infractions += found
         self.done = self.completion.completed or any(one.kind in ENDING for one in found)
@@ -477,20 +465,16 @@ def _place(x_m: float, y_m: float) -> str:
     return f"(x={x_m:.3f}, y={-y_m:.3f}, z=0.0)"
 
 
-def _middle(signal: Signal) -> tuple[float, float]:
-    (ax, ay), (bx, by) = signal.stop_line_m
-    return (ax + bx) / 2.0, (ay + by) / 2.0
-
-
-def _line_middle(sign: Sign) -> tuple[float, float]:
-    if sign.stop_line_m is None:
-        return sign.x_m, sign.y_m
-    (ax, ay), (bx, by) = sign.stop_line_m
+def _middle(ruling: Signal | Sign) -> tuple[float, float]:
+    """Of the stop line of a light or sign; where the sign itself stands, if it has none."""
+    if ruling.stop_line_m is None:
+        return ruling.x_m, ruling.y_m
+    (ax, ay), (bx, by) = ruling.stop_line_m
     return (ax + bx) / 2.0, (ay + by) / 2.0
 
 
 def _station(sign: Sign, lane: Lane) -> float:
-    return max(0.0, min(lane.length_m, lane.centre.nearest(*_line_middle(sign))))
+    return max(0.0, min(lane.length_m, lane.centre.nearest(*_middle(sign))))
 
 
 def _past_line(sign: Sign, road: RoadGraph, ego: VehicleState) -> float:

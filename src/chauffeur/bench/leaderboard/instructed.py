@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chauffeur.bench.lampilot.policy_aid import offer
 from chauffeur.bench.leaderboard.ways import PlannedRoute
 from chauffeur.concept import (
     ChauffeurError,
@@ -38,9 +39,10 @@ from chauffeur.describe.navigation import NOW_M, NavigationInstruction, Navigato
 from chauffeur.drive.actuate import set_points
 from chauffeur.drive.fallback import keep_lane_and_gap
 from chauffeur.drive.planning import checked, screened_request
+from chauffeur.geometry import Route
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.base import Planner
-from chauffeur.planners.prompts import Helper, build_coached_message, build_system_message
+from chauffeur.planners.prompts import build_system_message
 from chauffeur.planners.registry import make_planner
 from chauffeur.programs import ProgramExecutor
 from chauffeur.programs.sandbox import UNHURRIED
@@ -49,8 +51,6 @@ from chauffeur.worlds.base import World
 from chauffeur.worlds.town.pack import MapPack
 
 SETTINGS: Final = ("zero-shot", "few-shot", "human-feedback")
-OFFERED: Final = 3
-"""Programs of the repository that are offered with an instruction."""
 STOOD_S: Final = 45.0
 """A car that has stood for so long is told again."""
 AGAIN_S: Final = 10.0
@@ -83,6 +83,12 @@ class PlannerSpec:
         return (self.name, self.setting, self.digest, self.latency_s)
 
 
+def navigator_of(town: MapPack, route: Route) -> Navigator:
+    """The giver of navigation instructions along a route of a town."""
+    signals = [signal for group in town.signals for signal in group.signals(0.0)]
+    return Navigator(town.road, route, signals, town.signs, town.places)
+
+
 @lru_cache(maxsize=4)
 def _planner(spec: PlannerSpec) -> Planner:
     return make_planner(spec.name, **dict(spec.options))
@@ -98,12 +104,7 @@ def system_for(
 ) -> SystemMessage:
     """S for an instruction in a town: with the programs of a repository that are nearest, or with examples, or bare."""
     if setting == "human-feedback" and repository is not None:
-        recalled = repository.recall(words, context.situation.world, OFFERED)
-        helpers = [
-            Helper(one.entry.callable_name, one.entry.description, one.entry.command, one.entry.callable_source)
-            for one in recalled
-        ]
-        return build_coached_message(helpers, limits=limits, vocabulary="town", chain_of_thought=True)
+        return offer(repository, words, context.situation.world, limits, chain_of_thought=True)[0]
     examples = "few-shot" if setting == "few-shot" else "zero-shot"
     return build_system_message(examples, limits=limits, chain_of_thought=True, vocabulary="town")
 
@@ -172,9 +173,7 @@ class InstructedDriver:
             planner: Takes the place of the one that `spec` names.
             limits: Bounds of programs and set-points.
         """
-        first = world.observe()
-        signals = [signal for group in town.signals for signal in group.signals(0.0)]
-        self._navigator = Navigator(first.road, planned.route, signals, town.signs, town.places)
+        self._navigator = navigator_of(town, planned.route)
         self._world, self._spec, self._limits = world, spec, limits or Limits()
         self._planner = planner or _planner(spec)
         self._rng = np.random.default_rng([seed, 2])

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 
 from chauffeur.bench.leaderboard.criteria import RouteReferee
-from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
+from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec, navigator_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.bench.leaderboard.ways import PlannedRoute, plan_official, track_of
 from chauffeur.concept import ChauffeurError, Context, Limits, Observation, Plan, PlannerError, PlanRequest, Scenario
 from chauffeur.describe import describe
-from chauffeur.describe.navigation import NavigationInstruction, Navigator
+from chauffeur.describe.navigation import NavigationInstruction
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.planning import checked
 from chauffeur.geometry import LaneId, RoadGraph, Route, named_ways
@@ -27,7 +27,6 @@ from chauffeur.safety.checks import DRIVE_CHECKS
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld
 from chauffeur.worlds.town.library import load
-from chauffeur.worlds.town.pack import MapPack
 
 BEFORE_M: Final = (35.0, 110.0)
 """A lesson begins so far before its manoeuvre."""
@@ -93,12 +92,6 @@ def lessons_of(route: LeaderboardRoute, seed: int) -> Iterator[Lesson]:
         if not over and any(b not in town.road[a].successors for a, b in pairwise(piece.lanes)):
             continue  # the lane for it has to be changed into first: another lesson
         yield Lesson(f"{route.id}@{from_m:.0f}", route.town, piece, said, seed)
-
-
-def navigator_of(town: MapPack, route: Route) -> Navigator:
-    """The one who says the way along a route of a town."""
-    signals = [signal for group in town.signals for signal in group.signals(0.0)]
-    return Navigator(town.road, route, signals, town.signs, town.places)
 
 
 def cut(road: RoadGraph, route: Route, from_m: float, to_m: float) -> Route:

@@ -9,11 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import lru_cache
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile
+from chauffeur.bench.leaderboard.track import TURNS
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet
 from chauffeur.bench.leaderboard.ways import plan_keypoints
 from chauffeur.concept import ScenarioError
@@ -25,7 +27,6 @@ ROUTES_A_TOWN: Final = 3
 LEAST_M: Final = 350.0
 LEAST_TURNS: Final = 2
 TRIES: Final = 300
-_TURNING: Final = ("left", "right", "straight")
 
 
 def own_routes(towns: tuple[str, ...] = ()) -> tuple[RouteFile, TriggerSet]:
@@ -77,11 +78,8 @@ def routes_through(
             track = plan_keypoints(road, points).track
         except ScenarioError:
             continue
-        entries = [
-            i
-            for i in range(1, len(track.options))
-            if track.options[i] in _TURNING and track.options[i - 1] not in _TURNING
-        ]
+        pairs = enumerate(pairwise(track.options), start=1)
+        entries = [i for i, (before, here) in pairs if here in TURNS and before not in TURNS]
         turns = sum(track.options[i] in ("left", "right") for i in entries)
         if track.length_m < LEAST_M or turns < LEAST_TURNS or len(entries) < 3:
             continue

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
 
 from chauffeur.bench.leaderboard.criteria import Infraction
-from chauffeur.bench.leaderboard.scoring import KINDS, DrivenRoute, RouteScore, mean_score, official_rates, rates
+from chauffeur.bench.leaderboard.scoring import KINDS, mean_score, official_rates, rates
 
 NOT_DRIVEN: Final = "not driven"
 """The engine of a route that could not be set up."""
@@ -39,6 +37,8 @@ LABELS: Final = (
     "Agent blocked",
 )
 """Of the official file."""
+_SCORES: Final = {"score_route": "rc", "score_penalty": "ip", "score_composed": "ds"}
+"""Names of the official file and of our columns."""
 
 
 class LeaderboardRow(TypedDict):
@@ -108,12 +108,6 @@ def counted(infractions: Iterable[Infraction]) -> dict[str, int]:
     return {kind: counts.get(kind, 0) for kind in KINDS}
 
 
-def driven_of(row: Mapping[str, Any]) -> DrivenRoute:
-    """What the statistics read of a row."""
-    score = RouteScore(float(row["rc"]), float(row["ip"]), float(row["ds"]))
-    return DrivenRoute(score, {kind: int(row[kind]) for kind in KINDS}, float(row["length_m"]))
-
-
 def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequence[Infraction]]) -> dict[str, Any]:
     """The results as the official evaluator writes them (`results.json`), with the engine and its note beside.
 
@@ -122,18 +116,13 @@ def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequen
         infractions: Of each item.
     """
     records = [_record(row, index, infractions.get(row["item"], ())) for index, row in enumerate(rows)]
-    driven = [driven_of(row) for row in rows]
-    score, summed = mean_score(driven), official_rates(driven)
+    score, summed = mean_score(rows), official_rates(rows)
     failed = [
         [record["route_id"], record["index"], record["status"]] for record in records if record["status"] != "Completed"
     ]
     spread = {
-        name: statistics.stdev(values) if len(values) > 1 else "NaN"
-        for name, values in (
-            ("score_route", [one.score.route for one in driven]),
-            ("score_penalty", [one.score.penalty for one in driven]),
-            ("score_composed", [one.score.composed for one in driven]),
-        )
+        name: statistics.stdev(float(row[column]) for row in rows) if len(rows) > 1 else "NaN"
+        for name, column in _SCORES.items()
     }
     missing = any(row["infra_failed"] for row in rows)
     agent = any("Agent" in record["status"] for record in records)
@@ -145,7 +134,7 @@ def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequen
                 "route_id": -1,
                 "status": "Failed" if failed else "Completed",
                 "infractions": dict(summed),
-                "scores": _scores(score),
+                "scores": dict(zip(_SCORES, (score.route, score.penalty, score.composed), strict=True)),
                 "scores_std_dev": spread,
                 "meta": {"exceptions": failed} if failed else {},
             },
@@ -162,7 +151,7 @@ def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequen
         "chauffeur": {
             "engines": sorted({str(row["engine"]) for row in rows}),
             "note": NOTE,
-            "infractions_per_km": rates(driven),
+            "infractions_per_km": rates(rows),
         },
     }
 
@@ -174,31 +163,21 @@ def write_official(
     path.write_text(json.dumps(official(rows, infractions), indent=4, sort_keys=True) + "\n")
 
 
-def infraction_rows(infractions: Iterable[Infraction]) -> list[dict[str, Any]]:
-    """Infractions as JSON."""
-    return [asdict(one) for one in infractions]
-
-
 def infractions_of(rows: Iterable[Mapping[str, Any]]) -> tuple[Infraction, ...]:
-    """Infractions from JSON."""
+    """Infractions as they are stored of a drive."""
     return tuple(Infraction(**row) for row in rows)
-
-
-def _scores(score: RouteScore) -> dict[str, float]:
-    return {"score_route": score.route, "score_penalty": score.penalty, "score_composed": score.composed}
 
 
 def _record(row: Mapping[str, Any], index: int, infractions: Sequence[Infraction]) -> dict[str, Any]:
     messages: dict[str, list[str]] = {kind: [] for kind in KINDS}
     for one in infractions:
         messages[one.kind].append(one.message)
-    score = driven_of(row).score
     return {
         "index": index,
         "route_id": f"RouteScenario_{row['route']}",
         "status": row["status"],
         "infractions": messages,
-        "scores": {name: value if math.isfinite(value) else 0.0 for name, value in _scores(score).items()},
+        "scores": {name: float(row[column]) for name, column in _SCORES.items()},
         "meta": {
             "duration_game": row["simulated_s"],
             "duration_system": row["cpu_s"],

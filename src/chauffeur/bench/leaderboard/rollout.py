@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.drivers import RouteDriver, make_driver
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec, PlanningTally
-from chauffeur.bench.leaderboard.results import NOT_DRIVEN, infraction_rows, status_of
+from chauffeur.bench.leaderboard.results import NOT_DRIVEN, status_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.bench.leaderboard.staging import ScenarioWorld
 from chauffeur.bench.leaderboard.triggers import Trigger, place
@@ -17,6 +17,8 @@ from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError, MissingExtraError, Scenario
 from chauffeur.drive.actuate import actuate
 from chauffeur.safety.shield import shield_for
+from chauffeur.worlds.town import TownWorld
+from chauffeur.worlds.town.library import load
 
 ROUTE_VERSION: Final = "leaderboard-route-v5"
 """Changes whenever the same driver could come to another result."""
@@ -93,8 +95,6 @@ def drive_route(job: RouteJob) -> dict[str, Any]:
 
 
 def _driven(job: RouteJob) -> dict[str, Any]:
-    from chauffeur.worlds.town.library import load
-
     began = time.process_time()
     route = job.route
     if route.fault:
@@ -133,8 +133,6 @@ def _driven(job: RouteJob) -> dict[str, Any]:
     )
     speeds: list[float] = []
     try:
-        from chauffeur.worlds.town import TownWorld
-
         base = TownWorld(town)
         seen = base.reset(scenario)
     except MissingExtraError as error:
@@ -187,7 +185,7 @@ def _driven(job: RouteJob) -> dict[str, Any]:
         infra_failed=broken,
         completed=referee.completion.completed,
         completion=referee.completion.share,
-        infractions=infraction_rows(referee.infractions),
+        infractions=[asdict(one) for one in referee.infractions],
         status=status_of(referee.completion.completed, referee.infractions, "Simulation crashed" if broken else ""),
         engine=base.engine,
         length_m=track.length_m,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from chauffeur.bench.leaderboard.criteria import Infraction, InfractionKind
 from chauffeur.concept import ConfigError
@@ -79,44 +79,30 @@ def route_score(completion: float, infractions: Iterable[Infraction], scoring: S
     return RouteScore(100.0 * completion, factor, max(100.0 * completion * factor, 0.0))
 
 
-@dataclass(frozen=True, slots=True)
-class DrivenRoute:
-    """What the statistics of a run read of a route: its points, counts of infractions by kind, its length."""
-
-    score: RouteScore
-    counts: Mapping[InfractionKind, int]
-    length_m: float
-
-
-def mean_score(routes: Sequence[DrivenRoute], planned: int | None = None) -> RouteScore:
-    """Means over the planned routes; one that was not driven counts as 0 in all three, as in the official file."""
-    count = planned or len(routes)
-    if not count:
+def mean_score(routes: Sequence[Mapping[str, Any]]) -> RouteScore:
+    """Means over the rows of routes; one that was not driven counts as 0 in all three, as in the official file."""
+    if not routes:
         return RouteScore(0.0, 0.0, 0.0)
-    return RouteScore(
-        sum(one.score.route for one in routes) / count,
-        sum(one.score.penalty for one in routes) / count,
-        sum(one.score.composed for one in routes) / count,
-    )
+    rc, ip, ds = (sum(float(row[name]) for row in routes) / len(routes) for name in ("rc", "ip", "ds"))
+    return RouteScore(rc, ip, ds)
 
 
-def official_rates(routes: Sequence[DrivenRoute]) -> dict[InfractionKind, float]:
+def driven_km(row: Mapping[str, Any]) -> float:
+    """Length of a route, as far as it was completed, km."""
+    return row["rc"] / 100.0 * row["length_m"] / 1000.0
+
+
+def official_rates(routes: Sequence[Mapping[str, Any]]) -> dict[InfractionKind, float]:
     """Infractions a kilometre as the branch leaderboard-1.0 has them.
 
     Its faults are kept, so that files compare: routes without progress are left out, and the rates of the routes are
     summed, not averaged, so that a run of more routes has higher rates. `rates` is the corrected one.
     """
-    found: dict[InfractionKind, float] = dict.fromkeys(KINDS, 0.0)
-    for one in routes:
-        driven_km = one.score.route / 100.0 * one.length_m / 1000.0
-        if driven_km <= 0.0:
-            continue
-        for kind in KINDS:
-            found[kind] += one.counts.get(kind, 0) / driven_km
-    return found
+    moved = [(row, km) for row in routes if (km := driven_km(row)) > 0.0]
+    return {kind: sum((row[kind] / km for row, km in moved), 0.0) for kind in KINDS}
 
 
-def rates(routes: Sequence[DrivenRoute]) -> dict[InfractionKind, float | None]:
+def rates(routes: Sequence[Mapping[str, Any]]) -> dict[InfractionKind, float | None]:
     """Infractions a kilometre driven, over all routes together; None where nothing was driven."""
-    km = sum(one.score.route / 100.0 * one.length_m / 1000.0 for one in routes)
-    return {kind: sum(one.counts.get(kind, 0) for one in routes) / km if km > 0.0 else None for kind in KINDS}
+    km = sum(map(driven_km, routes))
+    return {kind: sum(row[kind] for row in routes) / km if km > 0.0 else None for kind in KINDS}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 from chauffeur.geometry import Pose, wrap_to_pi
 from chauffeur.geometry.route import RoadOption
 
-_TURNS: Final = ("left", "straight", "right")
+TURNS: Final[tuple[RoadOption, ...]] = ("left", "straight", "right")
+"""What a way does inside a junction."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,17 @@ class RouteTrack:
 
     def next_turn(self, index: int) -> RoadOption | None:
         """What the way does at the next junction from a point on; None where no junction follows."""
-        return next((option for option in self.options[index:] if option in _TURNS), None)
+        at = self.next_junction(index)
+        return None if at is None else self.options[at]
+
+    def next_junction(self, index: int) -> int | None:
+        """Index of the first point inside a junction, from a point on; None where no junction follows."""
+        return next((i for i in range(index, len(self.options)) if self.options[i] in TURNS), None)
+
+    def at(self, station_m: float) -> Pose:
+        """The pose at a distance along the way, between its points and a little beyond its end."""
+        index = max(bisect_right(self.stations_m, station_m) - 1, 0)
+        return self.poses[index].ahead(station_m - self.stations_m[index])
 
     def matches(self, pose: Pose, within_m: float, within_rad: float) -> int | None:
         """Index of the first point close to a pose in place and heading; None where there is none."""

@@ -9,9 +9,9 @@ from typing import Any, Final, get_args
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.motion.driving import MotionJob, job_key, statistics_from
+from chauffeur.bench.motion.driving import MotionJob, job_key
 from chauffeur.bench.motion.items import MotionItem, Shown, Told, data_sha256, motion_items, style_ranges
-from chauffeur.bench.motion.scoring import SCORE_VERSION, WEIGHTS, command_alignment, driving_score
+from chauffeur.bench.motion.scoring import SCORE_VERSION, WEIGHTS, MotionStatistics, command_alignment, driving_score
 from chauffeur.concept import ActionMatrix, ConfigError, Instruction, PlanRequest, SystemMessage
 from chauffeur.drive.planning import screened_request
 from chauffeur.safety.gain_box import care, gain_box
@@ -203,8 +203,8 @@ def _compared(row: Row, sunny: float | None) -> Row:
         return {"scenario_aligned": aligned, "score": 0.0}
     score = driving_score(
         row["manoeuvre"],
-        statistics_from(row["measured"]),
-        statistics_from(row["baseline"]),
+        MotionStatistics(**row["measured"]),
+        MotionStatistics(**row["baseline"]),
         row["latency_s"],
         row["command_alignment"],
         None if aligned is None else 100.0 * aligned,

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.rollout import plan_adapter
-from chauffeur.bench.motion.scoring import SCORE_VERSION, MotionStatistics, measured
+from chauffeur.bench.motion.scoring import SCORE_VERSION, measured
 from chauffeur.concept import ActionMatrix, ChauffeurError, Limits, Plan, Scenario
 from chauffeur.drive.planning import checked
 from chauffeur.drive.session import drive_policy, scenario_hash
@@ -80,8 +80,3 @@ def baseline_of(scenario: str) -> dict[str, Any]:
 def frozen(scenario: Scenario) -> str:
     """A scenario as a text, which a cache can be asked by."""
     return json.dumps(asdict(scenario), sort_keys=True)
-
-
-def statistics_from(row: Row) -> MotionStatistics:
-    """Measures as they are stored."""
-    return MotionStatistics(**row)

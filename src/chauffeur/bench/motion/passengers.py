@@ -23,6 +23,7 @@ import numpy as np
 from chauffeur.bench.motion.items import Style, style_ranges
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
 from chauffeur.bench.personalization.sayings import Force, Topic
+from chauffeur.bench.personalization.takeover import Judgement
 from chauffeur.concept import ActionMatrix
 from chauffeur.concept.weather import Weather
 from chauffeur.safety.gain_box import care
@@ -60,23 +61,6 @@ class RidingTaste:
     caution: float
     tolerance: float
     noise: float
-
-
-@dataclass(frozen=True, slots=True)
-class MannerJudgement:
-    """What a passenger made of a drive.
-
-    Attributes:
-        takes_over: Whether they took over.
-        topic: What they would say; `fine` of a drive that was all right.
-        force: How strongly.
-        deviation: By how many tolerances the gains were too careful (positive) or too bold.
-    """
-
-    takes_over: bool
-    topic: Topic
-    force: Force
-    deviation: float
 
 
 def draw_manners(count: int, seed: int) -> tuple[RidingTaste, ...]:
@@ -117,15 +101,18 @@ def meant() -> Mapping[str, float]:
 
 def judged(
     manner: RidingTaste, want: float, policy: ActionMatrix | None, outcome: str, task: ManoeuvreName
-) -> MannerJudgement:
-    """What a passenger makes of a drive; `policy` is None where nothing was driven."""
+) -> Judgement:
+    """What a passenger makes of a drive: gains that are too careful deviate upwards, too bold ones downwards.
+
+    `policy` is None where nothing was driven.
+    """
     if policy is None:
-        return MannerJudgement(True, "waited", "plain", 0.0)
+        return Judgement(True, 0.0, "waited", "plain")
     if outcome not in ("ended", "success"):
-        return MannerJudgement(True, "close_call", "plain", 0.0)
+        return Judgement(True, 0.0, "close_call", "plain")
     off = (care(policy) - want) / manner.tolerance
     if abs(off) <= 1.0:
-        return MannerJudgement(False, "fine", "plain", off)
+        return Judgement(False, 0.0, "fine", "plain", off)
     bold: Topic = "harsh" if task == "acceleration" else "swerving"
     force: Force = "bit" if abs(off) < _BIT else "much" if abs(off) > _MUCH else "plain"
-    return MannerJudgement(True, "too_slow" if off > 0.0 else bold, force, off)
+    return Judgement(True, 0.0, "too_slow" if off > 0.0 else bold, force, off)

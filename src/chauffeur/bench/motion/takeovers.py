@@ -11,12 +11,9 @@ from __future__ import annotations
 
 import asyncio
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -26,10 +23,10 @@ from chauffeur.bench.kernel.metrics import TableSpec, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.motion.driving import DRIVE_VERSION, MAX_S, frozen
 from chauffeur.bench.motion.items import MotionCommand, MotionItem, commands, data_sha256
-from chauffeur.bench.motion.passengers import MANNER_VERSION, MannerJudgement, draw_manners, judged, wanted
-from chauffeur.bench.personalization.ride import ReadOnly
-from chauffeur.bench.personalization.sayings import feedback_of, sayings_sha256
-from chauffeur.bench.personalization.study import Calendar
+from chauffeur.bench.motion.passengers import MANNER_VERSION, draw_manners, judged, wanted
+from chauffeur.bench.personalization.ride import ReadOnly, learning, planner_of
+from chauffeur.bench.personalization.sayings import sayings_sha256
+from chauffeur.bench.personalization.takeover import Judgement, remark
 from chauffeur.concept import (
     NOBODY,
     ActionMatrix,
@@ -52,9 +49,6 @@ from chauffeur.describe.track import describe_track
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.loop import LoopMemory, Stages, drive
 from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip
-from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.memory.privacy import Privacy
-from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
@@ -261,19 +255,14 @@ class _Sitting:
     async def row(self) -> Row:
         """All trips, as one row."""
         job, trips = self._job, list[Row]()
-        person = PersonId(f"simulated {self._manner.who.id}")
-        planner = _planner(job.planner)
-        with tempfile.TemporaryDirectory(prefix="chauffeur-riders-") as home:
-            clock = Calendar(datetime(2026, 1, 5, 8, 0, tzinfo=UTC))
-            vault = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=clock)
+        planner = planner_of(job.planner)
+        with learning(self._manner.who) as (vault, person, end_day):
             memory = fitting(vault, job.planner)
             for _ in range(job.trips):
                 item, want = self._day(self._commands[int(self._rng.integers(len(self._commands)))])
                 trip, found = await self._ride(planner, memory, person, item, want)
-                said = self._say(found)
-                if said:
-                    memory.attach_feedback(person, interpret_feedback(said))
-                clock.forward()
+                said = remark(self._manner.who, found, "test", self._rng)
+                end_day(said)
                 trips.append(self._trip_row("with", "learning", 0, item, want, trip, found, said))
             learnt = ReadOnly(memory)
             for level in LEVELS:
@@ -282,7 +271,7 @@ class _Sitting:
                 for place, index in enumerate(self._rng.permutation(len(ARMS)), start=1):
                     arm = ARMS[int(index)]
                     asked, recalls, who = {
-                        "fixed": (_planner("gains"), Forgetful(), NOBODY),
+                        "fixed": (planner_of("gains"), Forgetful(), NOBODY),
                         "without": (planner, Forgetful(), NOBODY),
                         "with": (planner, learnt, person),
                     }[arm]
@@ -298,7 +287,7 @@ class _Sitting:
 
     async def _ride(
         self, planner: Planner, memory: LoopMemory, person: PersonId, item: MotionItem, want: float
-    ) -> tuple[Trip, MannerJudgement]:
+    ) -> tuple[Trip, Judgement]:
         driven: list[Episode] = []
 
         def execute(
@@ -323,15 +312,6 @@ class _Sitting:
         policy = trip.plan.policy if driven and isinstance(trip.plan.policy, ActionMatrix) else None
         return trip, judged(self._manner, want, policy, trip.outcome, item.command.manoeuvre)
 
-    def _say(self, found: MannerJudgement) -> str:
-        """Feedback after a drive, in words; empty where they say nothing."""
-        if not found.takes_over:
-            chance = {"silent": 0.0, "brief": 0.5, "open": 1.0}[self._manner.who.talk]
-            if self._rng.random() >= chance:
-                return ""
-        texts = feedback_of(found.topic, found.force, "test")
-        return texts[int(self._rng.integers(len(texts)))]
-
     def _trip_row(
         self,
         arm: Arm,
@@ -340,7 +320,7 @@ class _Sitting:
         item: MotionItem,
         want: float,
         trip: Trip,
-        found: MannerJudgement,
+        found: Judgement,
         said: str,
     ) -> Row:
         policy = trip.plan.policy
@@ -379,12 +359,6 @@ def _driven(scenario: str, policy: ActionMatrix) -> Episode:
 @lru_cache(maxsize=_KEPT)
 def _picture(item: MotionItem) -> tuple[CameraImage, ...]:
     return item.shown("on")
-
-
-@lru_cache(maxsize=2)
-def _planner(spec: str) -> Planner:
-    """This process's planner: loading a model takes longer than a trip."""
-    return make_planner(spec)
 
 
 def _no_system(limits: Limits) -> SystemMessage:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from dataclasses import asdict
+from typing import (
+    Any,
+    Final,
+    NotRequired,  # pydantic reads the standard library's from Python 3.12 on only
+)
 
-from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
+from typing_extensions import TypedDict
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.store import Row
@@ -15,7 +19,7 @@ from chauffeur.bench.personalization.figures import JUDGE, TABLES
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
-from chauffeur.bench.personalization.study import BENCH_VERSION, StudyJob, versions
+from chauffeur.bench.personalization.study import BENCH_VERSION, StudyConfig, StudyJob, versions
 from chauffeur.concept import ConfigError
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.registry import make_planner
@@ -24,26 +28,9 @@ SIMULATED: Final = "simulated passengers in simulated drives; nobody was asked a
 """Stands beside every figure."""
 
 
-@dataclass(frozen=True, slots=True)
-class StudyConfig:
-    """What decides a run.
+class TripRow(TypedDict):
+    """A trip; the fields of its plan are missing where the passenger chose."""
 
-    Attributes:
-        passengers: How many simulated people.
-        seed: They, their moods and their words are drawn from it.
-        planner: Who plans without and with memory.
-        half: Which half of the wordings is said.
-        trips: How many trips the memory learns from, for each task.
-    """
-
-    passengers: int = 100
-    seed: int = 1
-    planner: str = "talk2drive"
-    half: Half = "test"
-    trips: int = 5
-
-
-class _TripFields(TypedDict):
     passenger: str
     arm: str
     task: str
@@ -68,18 +55,13 @@ class _TripFields(TypedDict):
     model: str
     half: str
     note: str
-
-
-class TripRow(_TripFields, total=False):
-    """A trip; the fields of its plan are missing where the passenger chose."""
-
-    declined: bool
-    refusal: str
-    intent: str
-    policy: dict[str, Any] | None
-    recalled: int
-    feedback: str
-    latency_s: float
+    declined: NotRequired[bool]
+    refusal: NotRequired[str]
+    intent: NotRequired[str]
+    policy: NotRequired[dict[str, Any] | None]
+    recalled: NotRequired[int]
+    feedback: NotRequired[str]
+    latency_s: NotRequired[float]
 
 
 class StudyBenchmark(Unasked):
@@ -120,10 +102,9 @@ class StudyBenchmark(Unasked):
 
     def items(self) -> Sequence[StudyJob]:
         """See Benchmark: person by person, so that what is done at any time is a whole study."""
-        one, options = self.options, self._planner_options
         return [
-            StudyJob(f"{who.id}.{task}", number, task, one.seed, one.planner, one.half, one.trips, options)
-            for number, who in enumerate(draw_passengers(one.passengers, one.seed))
+            StudyJob(f"{who.id}.{task}", number, task, self.options, self._planner_options)
+            for number, who in enumerate(draw_passengers(self.options.passengers, self.options.seed))
             for task in TASKS
         ]
 

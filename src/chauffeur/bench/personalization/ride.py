@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections import OrderedDict
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from functools import lru_cache
-from typing import Final, Literal
+from pathlib import Path
+from typing import Any, Final, Literal
 
+from chauffeur.bench.personalization.population import Passenger
 from chauffeur.bench.personalization.scenes import DRIVE_S, GROUND_OF, Task
 from chauffeur.bench.personalization.traces import Trace, trace_of
 from chauffeur.concept import (
@@ -31,8 +37,12 @@ from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode, Referee
 from chauffeur.drive.loop import LoopMemory, Stages, drive
 from chauffeur.drive.session import check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.memory.feedback import interpret_feedback
+from chauffeur.memory.privacy import Privacy
+from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import build_system_message
+from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.base import World
 from chauffeur.worlds.parking import ParkingReferee, ParkingWorld
 from chauffeur.worlds.parking.lot import Spot, build_lot
@@ -77,6 +87,32 @@ class ReadOnly:
     def remember(self, trip: Trip, feedback: Feedback | None) -> None:
         """Nothing."""
         del trip, feedback
+
+
+@contextmanager
+def learning(passenger: Passenger) -> Generator[tuple[VaultMemory, PersonId, Callable[[str], None]]]:
+    """A passenger's memory in a folder of its own, their name in it, and the call that ends a day.
+
+    That call gives the memory what the passenger said of the day's trip, if anything, and goes on to the next day.
+    """
+    now = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
+    person = PersonId(f"simulated {passenger.id}")
+    with tempfile.TemporaryDirectory(prefix="chauffeur-study-") as home:
+        vault = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=lambda: now)
+
+        def end_day(said: str) -> None:
+            nonlocal now
+            if said:
+                vault.attach_feedback(person, interpret_feedback(said))
+            now += timedelta(days=1)
+
+        yield vault, person, end_day
+
+
+@lru_cache(maxsize=2)
+def planner_of(spec: str, options: tuple[tuple[str, Any], ...] = ()) -> Planner:
+    """This process's planner: loading a model takes longer than a trip."""
+    return make_planner(spec, **dict(options))
 
 
 async def ride(

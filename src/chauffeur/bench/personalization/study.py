@@ -8,11 +8,8 @@ scenes, levels by chance, and after each the passenger said how it was, in words
 from __future__ import annotations
 
 import asyncio
-import tempfile
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime, timedelta
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -20,8 +17,17 @@ import numpy as np
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.population import POPULATION_VERSION, draw_passengers
-from chauffeur.bench.personalization.ride import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
-from chauffeur.bench.personalization.sayings import LEVELS, PLACE_WORDS, Half, Level, feedback_of, wishes_of
+from chauffeur.bench.personalization.ride import (
+    RIDE_VERSION,
+    ReadOnly,
+    Ride,
+    learning,
+    planner_of,
+    ride,
+    ride_policy,
+    usual,
+)
+from chauffeur.bench.personalization.sayings import LEVELS, PLACE_WORDS, Half, Level, wishes_of
 from chauffeur.bench.personalization.scenes import GROUND_OF, TASKS, Task, scenes_of
 from chauffeur.bench.personalization.takeover import (
     TAKEOVER_VERSION,
@@ -29,15 +35,12 @@ from chauffeur.bench.personalization.takeover import (
     Mood,
     aim_of,
     judge,
+    remark,
     wanted_mps,
 )
-from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace
-from chauffeur.concept import NOBODY, Limits, Parameters, PersonId, Scenario
+from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace, limit_of
+from chauffeur.concept import NOBODY, Limits, Parameters, Scenario
 from chauffeur.drive.session import Forgetful, make_world
-from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.memory.privacy import Privacy
-from chauffeur.memory.vault import VaultMemory
-from chauffeur.planners.base import Planner
 from chauffeur.planners.talk2drive.recent import RecentToo
 
 BENCH_VERSION: Final = "personalization-v3"
@@ -56,6 +59,25 @@ def arms_of(task: Task) -> tuple[Arm, ...]:
 
 
 @dataclass(frozen=True, slots=True)
+class StudyConfig:
+    """What decides a run.
+
+    Attributes:
+        passengers: How many simulated people.
+        seed: They, their moods and their words are drawn from it.
+        planner: Who plans without and with memory.
+        half: Which half of the wordings is said.
+        trips: How many trips the memory learns from, for each task.
+    """
+
+    passengers: int = 100
+    seed: int = 1
+    planner: str = "talk2drive"
+    half: Half = "test"
+    trips: int = 5
+
+
+@dataclass(frozen=True, slots=True)
 class StudyJob:
     """One passenger, one task.
 
@@ -63,25 +85,18 @@ class StudyJob:
         key: E.g. `p0007.overtake`.
         number: The passenger's, from 0.
         task: What for.
-        seed: Of the study.
-        planner: Who plans without and with memory.
-        half: Which wordings are said.
-        trips: How many trips the memory learns from.
+        study: What decides the run.
         options: Of the planner.
     """
 
     key: str
     number: int
     task: Task
-    seed: int
-    planner: str
-    half: Half
-    trips: int
+    study: StudyConfig
     options: tuple[tuple[str, Any], ...] = ()
 
     @property
     def id(self) -> str:
-        """See BenchItem: a sitting is asked for, and done, by itself."""
         return self.key
 
     @property
@@ -91,7 +106,7 @@ class StudyJob:
 
     def run(self) -> Row:
         """All trips, as one row. Raises ChauffeurError: an endpoint that does not answer is no takeover."""
-        return asyncio.run(sit(self))
+        return asyncio.run(_Sitting(self).row())
 
     def spoiled(self, detail: str) -> Row:
         return {"key": self.key, "infra_failed": True, "detail": detail}
@@ -108,81 +123,74 @@ def versions() -> dict[str, str]:
     }
 
 
-async def sit(job: StudyJob) -> Row:
-    """All trips of one passenger for one task, as one row, where a loop runs already."""
-    return await _Sitting(job).rows()
+@dataclass(frozen=True, slots=True)
+class _Day:
+    """An occasion: what is wanted, where, and the words for it."""
+
+    mood: Mood
+    scene: Scenario
+    words: str
 
 
 class _Sitting:
     """A passenger with their words, moods and the order of their trips."""
 
     def __init__(self, job: StudyJob) -> None:
-        self._job = job
-        self._passenger = draw_passengers(job.number + 1, job.seed)[job.number]
-        self._rng = np.random.default_rng([job.seed, job.number, TASKS.index(job.task), 1])
+        self._job, self._study = job, job.study
+        self._passenger = draw_passengers(job.number + 1, job.study.seed)[job.number]
+        self._rng = np.random.default_rng([job.study.seed, job.number, TASKS.index(job.task), 1])
         self._scenes = scenes_of(job.task)
-        self._planner = _planner(job.planner, job.options)
 
-    async def rows(self) -> Row:
-        """The row."""
+    async def row(self) -> Row:
+        """All trips, as one row."""
         job = self._job
+        own = planner_of(self._study.planner, job.options)
         trips: list[Row] = []
-        now = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
-        with tempfile.TemporaryDirectory(prefix="chauffeur-study-") as home:
-            clock = Calendar(now)
-            vault = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=clock)
+        with learning(self._passenger) as (vault, person, end_day):
             memory = RecentToo(vault)
-            person = PersonId(f"simulated {self._passenger.id}")
-            for number in range(1, job.trips + 1):
-                mood, scene, words = self._occasion(self._level())
-                done = await ride(self._planner, memory, words, person, job.task, scene, _LIMITS)
-                found = judge(done.trace, self._passenger, mood)
-                said = self._say(found, mood)
-                if said:
-                    vault.attach_feedback(person, interpret_feedback(said))
-                clock.forward()
-                trips.append(self._row("with", number, mood, words, done, found, said, 0, "learning"))
-            learnt = ReadOnly(memory)
+            for number in range(1, self._study.trips + 1):
+                day = self._day(LEVELS[int(self._rng.integers(len(LEVELS)))])
+                done = await ride(own, memory, day.words, person, job.task, day.scene, _LIMITS)
+                found = judge(done.trace, self._passenger, day.mood)
+                said = self._say(found, day.mood)
+                end_day(said)
+                trips.append(self._row("with", day, number, 0, done.trace, found) | _planned(done, "learning", said))
+            asked = {
+                "keyword": (KeywordParameters(), NOBODY, Forgetful()),
+                "keyword-fair": (KeywordParameters(fair=True), NOBODY, Forgetful()),
+                "without": (own, NOBODY, Forgetful()),
+                "with": (own, person, ReadOnly(memory)),
+            }
+            arms = arms_of(job.task)
             for level in LEVELS:
-                mood, scene, words = self._occasion(level)
-                arms = arms_of(job.task)
-                order: list[Arm] = [arms[int(index)] for index in self._rng.permutation(len(arms))]
-                for place, arm in enumerate(order, start=1):
+                day = self._day(level)
+                for place, index in enumerate(self._rng.permutation(len(arms)), start=1):
+                    arm = arms[int(index)]
                     if arm == "ideal":
-                        trace = ride_policy(self._ideal(mood, scene), job.task, scene, _LIMITS)
-                        found = judge(trace, self._passenger, mood)
-                        trips.append(self._bare(arm, mood, words, scene, trace, found, place))
-                        continue
-                    planner, who, recalls = {
-                        "keyword": (_keyword(fair=False), NOBODY, Forgetful()),
-                        "keyword-fair": (_keyword(fair=True), NOBODY, Forgetful()),
-                        "without": (self._planner, NOBODY, Forgetful()),
-                        "with": (self._planner, person, learnt),
-                    }[arm]
-                    done = await ride(planner, recalls, words, who, job.task, scene, _LIMITS)
-                    found = judge(done.trace, self._passenger, mood)
-                    trips.append(self._row(arm, job.trips + 1, mood, words, done, found, "", place, "measured"))
+                        trace, plan = ride_policy(self._ideal(day), job.task, day.scene, _LIMITS), Row()
+                    else:
+                        planner, who, recalls = asked[arm]
+                        done = await ride(planner, recalls, day.words, who, job.task, day.scene, _LIMITS)
+                        trace, plan = done.trace, _planned(done, "measured", "")
+                    found = judge(trace, self._passenger, day.mood)
+                    trips.append(self._row(arm, day, self._study.trips + 1, place, trace, found) | plan)
         row: Row = {"key": job.key, "infra_failed": False, "passenger": self._passenger.id, "task": job.task}
         return row | {"trips": trips}
 
-    def _level(self) -> Level:
-        return LEVELS[int(self._rng.integers(len(LEVELS)))]
-
-    def _occasion(self, level: Level) -> tuple[Mood, Scenario, str]:
-        """A day: a scene, what is wanted, and the words for it."""
+    def _day(self, level: Level) -> _Day:
         passenger, job, rng = self._passenger, self._job, self._rng
         scene = self._scenes[int(rng.integers(len(self._scenes)))]
         start, limit = _start(job.task, scene.id)
         aim = aim_of(passenger, job.task, int(rng.integers(3)), start, limit)
         pace = float(1.0 + passenger.noise * rng.normal())
-        words = wishes_of(aim, level, job.half)
-        return Mood(job.task, aim, level, pace), scene, words[int(rng.integers(len(words)))]
+        words = wishes_of(aim, level, self._study.half)
+        return _Day(Mood(job.task, aim, level, pace), scene, words[int(rng.integers(len(words)))])
 
-    def _ideal(self, mood: Mood, scene: Scenario) -> Parameters:
+    def _ideal(self, day: _Day) -> Parameters:
         """What the passenger would choose, who knows what they want."""
-        _, limit = _start(mood.task, scene.id)
-        ground = GROUND_OF[mood.task]
-        step = 0.5 if ground == "highway" else 0.25  # as exactly as anybody sets a speed
+        mood = day.mood
+        _, limit = _start(mood.task, day.scene.id)
+        step = 0.5 if GROUND_OF[mood.task] == "highway" else 0.25  # as exactly as anybody sets a speed
         speed = min(step * round(wanted_mps(self._passenger, mood, limit) / step), limit)
         shy = mood.level == "III" and self._passenger.lane_habit == "stays"
         lane: Literal[-1, 0, 1] = 0
@@ -195,65 +203,23 @@ class _Sitting:
 
     def _say(self, found: Judgement, mood: Mood) -> str:
         """Feedback after a drive, in words of their own; empty where they say nothing."""
-        talk = self._passenger.talk
-        if not found.takes_over:
-            chance = {"silent": 0.0, "brief": 0.5, "open": 1.0}[talk]
-            if self._rng.random() >= chance:
-                return ""
-        texts = feedback_of(found.topic, found.force, self._job.half)
-        text = texts[int(self._rng.integers(len(texts)))]
         choice = mood.aim.partition(".")[2]  # a place, or a direction of speed
-        return text.format(place=PLACE_WORDS.get(choice, "in a free spot"), pace=choice)
+        words = remark(self._passenger, found, self._study.half, self._rng)
+        return words.format(place=PLACE_WORDS.get(choice, "in a free spot"), pace=choice)
 
-    def _row(
-        self,
-        arm: Arm,
-        number: int,
-        mood: Mood,
-        words: str,
-        done: Ride,
-        found: Judgement,
-        said: str,
-        place: int,
-        phase: str,
-    ) -> Row:
-        plan = done.trip.plan
-        row = self._bare(arm, mood, words, None, done.trace, found, place)
-        row |= {
-            "scene": done.trip.scenario,
-            "trip": number,
-            "phase": phase,
-            "declined": done.declined,
-            "refusal": plan.refusal,
-            "intent": plan.intent,
-            "policy": None if plan.policy is None else asdict(plan.policy),
-            "recalled": len(done.trip.history.items),
-            "feedback": said,
-            "latency_s": round(plan.latency_s, 4),
-        }
-        return row
-
-    def _bare(
-        self,
-        arm: Arm,
-        mood: Mood,
-        words: str,
-        scene: Scenario | None,
-        trace: Trace,
-        found: Judgement,
-        place: int,
-    ) -> Row:
+    def _row(self, arm: Arm, day: _Day, trip: int, place: int, trace: Trace, found: Judgement) -> Row:
+        mood = day.mood
         return {
             "arm": arm,
             "task": mood.task,
             "ground": GROUND_OF[mood.task],
             "aim": mood.aim,
             "level": mood.level,
-            "scene": "" if scene is None else scene.id,
-            "trip": self._job.trips + 1,
+            "scene": day.scene.id,
+            "trip": trip,
             "phase": "measured",
             "place": place,
-            "wish": words,
+            "wish": day.words,
             "wanted_mps": round(wanted_mps(self._passenger, mood, trace.limit_mps), 2),
             "outcome": trace.outcome,
             "seconds": round(trace.seconds, 1),
@@ -266,18 +232,19 @@ class _Sitting:
         }
 
 
-class Calendar:
-    """A clock that stands still until the next day."""
-
-    def __init__(self, start: datetime) -> None:
-        self._now = start
-
-    def __call__(self) -> datetime:
-        return self._now
-
-    def forward(self) -> None:
-        """The next day."""
-        self._now += timedelta(days=1)
+def _planned(done: Ride, phase: str, said: str) -> Row:
+    """The columns of a trip that a planner drove."""
+    plan = done.trip.plan
+    return {
+        "phase": phase,
+        "declined": done.declined,
+        "refusal": plan.refusal,
+        "intent": plan.intent,
+        "policy": None if plan.policy is None else asdict(plan.policy),
+        "recalled": len(done.trip.history.items),
+        "feedback": said,
+        "latency_s": round(plan.latency_s, 4),
+    }
 
 
 @lru_cache(maxsize=64)
@@ -285,18 +252,4 @@ def _start(task: Task, scene: str) -> tuple[float, float]:
     """Speed and limit at the beginning of a scene, m/s."""
     found = next(one for one in scenes_of(task) if one.id == scene)
     shot = make_world(found).reset(found)
-    here = shot.road.get(shot.ego.lane) or shot.road.lanes[0]
-    return shot.ego.speed_mps, here.speed_limit_mps
-
-
-@lru_cache(maxsize=2)
-def _planner(spec: str, options: tuple[tuple[str, Any], ...]) -> Planner:
-    """This process's planner: loading a model takes longer than a trip."""
-    from chauffeur.planners.registry import make_planner
-
-    return make_planner(spec, **dict(options))
-
-
-@lru_cache(maxsize=2)
-def _keyword(*, fair: bool) -> Planner:
-    return KeywordParameters(fair=fair)
+    return shot.ego.speed_mps, limit_of(shot)

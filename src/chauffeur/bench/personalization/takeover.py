@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.personalization.population import Passenger
-from chauffeur.bench.personalization.sayings import Aim, Force, Level, Topic
+from chauffeur.bench.personalization.population import Passenger, Talk
+from chauffeur.bench.personalization.sayings import Aim, Force, Half, Level, Topic, feedback_of
 from chauffeur.bench.personalization.scenes import GROUND_OF, Ground, Task
 from chauffeur.bench.personalization.traces import Array, Flags, Trace
 
@@ -47,6 +47,8 @@ _PASSING_S: Final = 2.0
 """Passing may take this many times the patience once it has begun."""
 _REMARK: Final = 0.6
 """Share of the tolerance from which a drive that was all right is remarked upon."""
+_SPEAKS: Final[dict[Talk, float]] = {"silent": 0.0, "brief": 0.5, "open": 1.0}
+"""Probability of a remark after a drive that was all right (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +74,10 @@ class Judgement:
 
     Attributes:
         takes_over: Whether they took over.
-        at_s: When, since the drive began.
+        at_s: When, since the drive began; 0 where the manner is judged as a whole.
         topic: What it was about; of a drive that was all right, what they would remark on.
         force: How strongly.
-        deviation: By how many tolerances the speed was off at the end, signed; 0 where speed was not the matter.
+        deviation: By how many tolerances speed or gains were off, signed; 0 where they were not the matter.
     """
 
     takes_over: bool
@@ -119,6 +121,14 @@ def judge(trace: Trace, passenger: Passenger, mood: Mood) -> Judgement:
     if abs(off) > _REMARK:
         return Judgement(False, trace.seconds, "too_fast" if off > 0 else "too_slow", "bit", round(off, 3))
     return Judgement(False, trace.seconds, "fine", "plain", round(off, 3))
+
+
+def remark(passenger: Passenger, found: Judgement, half: Half, rng: np.random.Generator) -> str:
+    """Feedback after a drive in the words of one half, placeholders unfilled; empty where they say nothing."""
+    if not found.takes_over and rng.random() >= _SPEAKS[passenger.talk]:
+        return ""
+    texts = feedback_of(found.topic, found.force, half)
+    return texts[int(rng.integers(len(texts)))]
 
 
 Event = tuple[int, Topic, float]

@@ -116,7 +116,7 @@ def trace_of(episode: Episode, dt_s: float, *, parked: str = "", walk_m: dict[st
     return Trace(
         dt_s=dt_s,
         outcome=episode.outcome,
-        limit_mps=_limit(shots[0]),
+        limit_mps=limit_of(shots[0]),
         speed=speed,
         acceleration=np.array([frame.applied.acceleration_mps2 for frame in frames]),
         sideways=speed * turning,
@@ -140,7 +140,8 @@ def _or_inf(value: float | None) -> float:
     return math.inf if value is None else value
 
 
-def _limit(shot: Observation) -> float:
+def limit_of(shot: Observation) -> float:
+    """Speed limit where the ego is, m/s."""
     here = shot.road.get(shot.ego.lane) or shot.road.lanes[0]
     return here.speed_limit_mps
 
