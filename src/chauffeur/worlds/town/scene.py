@@ -10,7 +10,7 @@ from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.places import Destination
-from chauffeur.worlds.skeleton import ShownWorld
+from chauffeur.worlds.skeleton import WorldBase, set_up
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant
 from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
@@ -32,7 +32,7 @@ _LEFT_M: Final = 8.0
 """A place has been left when the car is so far from where it stood."""
 
 
-class TownScene(ShownWorld):
+class TownScene(WorldBase[TownPerception, TownDriver]):
     """Road, lights, driver and perception of a trip. Who and what is where, its heirs say."""
 
     capabilities = TOWN_CAPABILITIES
@@ -42,12 +42,10 @@ class TownScene(ShownWorld):
         self._given = town
         self._town: MapPack | None = None
         self._config: TownConfig | None = None
-        self._driver: TownDriver | None = None
         self._route: Route | None = None
         self._lane: LaneId | None = None
         self._ego_station = 0.0
         self._tick = 0
-        self._shown: Observation | None = None
         self._others: tuple[VehicleState, ...] = ()
         self._forced: dict[str, SignalState] = {}
         self._place = ""
@@ -80,20 +78,7 @@ class TownScene(ShownWorld):
     @property
     def town(self) -> MapPack:
         """Where it is driven. Raises ScenarioError before the first reset."""
-        if self._town is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._town
-
-    def perception(self) -> TownPerception:
-        """Questions about the present instant."""
-        assert self.town is not None
-        return self._perception
-
-    def driver(self) -> TownDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        assert self.town is not None
-        assert self._driver is not None
-        return self._driver
+        return set_up(self._town)
 
     # Places -----------------------------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.path_follower import Chassis
-from chauffeur.worlds.skeleton import ShownWorld, config_of, finite
+from chauffeur.worlds.skeleton import WorldBase, config_of, finite, set_up
 from chauffeur.worlds.track.dynamics import (
     BRAKES_MPS2,
     DRIVE_LAG_S,
@@ -78,7 +78,7 @@ class TrackConfig(BaseModel):
     street: StreetConfig | None = None
 
 
-class TrackWorld(ShownWorld):
+class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
     """A test track, stepped at 20 Hz."""
 
     engine = "test track 1 (CommonRoad vehicle models 3.0.2)"
@@ -101,8 +101,6 @@ class TrackWorld(ShownWorld):
         self._rng = np.random.default_rng(0)
         self._tick = 0
         self._crashed = False
-        self._perception: ObservedPerception | None = None
-        self._driver: LaneDriver | None = None
 
     @property
     def dt_s(self) -> float:
@@ -222,18 +220,6 @@ class TrackWorld(ShownWorld):
             self._crashed, self._shown = True, None
         return Command(wanted, angle)
 
-    def perception(self) -> ObservedPerception:
-        """Questions about the present instant."""
-        self._started()
-        assert self._perception is not None
-        return self._perception
-
-    def driver(self) -> LaneDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        self._started()
-        assert self._driver is not None
-        return self._driver
-
     def body(self) -> tuple[Pose, float, float]:
         """Centre of mass and heading; speed over ground, m/s; yaw rate, rad/s: the truth of the plant."""
         x, y, _, along, heading, yaw_rate = self._state[:6].tolist()
@@ -245,9 +231,7 @@ class TrackWorld(ShownWorld):
         return float(state[10]) if len(state) > 10 else float(state[3] * math.sin(state[6]))
 
     def _started(self) -> TrackConfig:
-        if self._config is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._config
+        return set_up(self._config)
 
     def _lead(self) -> VehicleState | None:
         plan = self._course
