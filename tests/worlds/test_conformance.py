@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from world_contract import WorldContract
 
-from chauffeur.concept import Command, Observation, Scenario
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError
+from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.scenarios import BUILT_IN
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import Polyline, RoadGraph
@@ -31,6 +32,13 @@ class TestBuiltInWorlds(WorldContract):
         scenario: Scenario = request.param
         pytest.importorskip({"town": "libsumo", "track": "vehiclemodels"}.get(scenario.world, "math"))
         return lambda: make_world(scenario), scenario
+
+
+@pytest.mark.parametrize("world", sorted({scenario.world for scenario in BUILT_IN}))
+@pytest.mark.parametrize("ask", ["observe", "perception", "driver"])
+def test_before_the_first_reset_a_built_in_world_says_what_is_missing(world: str, ask: str) -> None:
+    with pytest.raises(ScenarioError, match="no scenario"):
+        getattr(load_plugin("chauffeur.worlds", world)(), ask)()
 
 
 class TestTheExample(WorldContract):
