@@ -92,5 +92,5 @@ class Conditions:
 
     @property
     def lamps(self) -> bool:
-        """Whether vehicles drive with their head lamps on."""
+        """True if vehicles drive with their head lamps on."""
         return self.night >= 0.3 or self.visibility_m < 1_500.0

@@ -103,7 +103,7 @@ class Ground:
         return GroundFault(index, self._kind(x, y), beyond)
 
     def off_road(self, x_m: float, y_m: float) -> bool:
-        """Whether a car whose middle is at a place has left all that cars drive or stand on, in whatever direction."""
+        """True if a car whose middle is at a place has left all that cars drive or stand on, in whatever direction."""
         return self.off_m(x_m, y_m) > OFF_ROAD_M
 
     def off_m(self, x_m: float, y_m: float) -> float:

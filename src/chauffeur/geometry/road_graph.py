@@ -86,7 +86,7 @@ class Lane:
 
     @property
     def emergency(self) -> bool:
-        """Whether it is a shoulder."""
+        """True if it is a shoulder."""
         return self.kind == "emergency"
 
     @cached_property
@@ -164,7 +164,7 @@ class RoadGraph:
         return {lane.id: lane for lane in self.lanes}
 
     def __contains__(self, lane: object) -> bool:
-        """Whether it has a lane of this name."""
+        """True if it has a lane of this name."""
         return lane in self.by_id
 
     def __getitem__(self, lane: LaneId) -> Lane:
@@ -182,17 +182,17 @@ class RoadGraph:
 
     @cached_property
     def uninterrupted(self) -> bool:
-        """Whether traffic flows on it without end: no junction, no aisle (the Highway Capacity Manual's motorways)."""
+        """True if traffic flows on it without end: no junction, no aisle (the Highway Capacity Manual's motorways)."""
         return not self.junctions and all(lane.kind in ("driving", "emergency") for lane in self.lanes)
 
     @cached_property
     def has_shape(self) -> bool:
-        """Whether it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
+        """True if it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
         return bool(self.paved) or any(lane.width_m > 0.0 for lane in self.lanes)
 
     @cached_property
     def has_parking(self) -> bool:
-        """Whether there are spots to park in."""
+        """True if there are spots to park in."""
         return any(lane.kind == "parking" for lane in self.lanes)
 
     # Beside -----------------------------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ class Perception(Protocol):
         ...
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the road has this lane."""
+        """True if the road has this lane."""
         ...
 
     def lane_of(self, vehicle_id: int) -> LaneId:
@@ -123,7 +123,7 @@ class StreetPerception(Perception, Protocol):
         ...
 
     def is_clear(self) -> bool:
-        """Whether no road user that crosses the way is being let go first."""
+        """True if no road user that crosses the way is being let go first."""
         ...
 
     def place_ahead(self, name: str) -> float | None:
@@ -181,7 +181,7 @@ class World(Protocol):
 
     @property
     def ended(self) -> bool:
-        """Whether the world will not step further: crash, off the road, end of road or of time."""
+        """True if the world will not step further: crash, off the road, end of road or of time."""
         ...
 
     def perception(self) -> Perception:

@@ -179,7 +179,7 @@ class Follower:
         return angle_of(curvature, self._chassis.wheelbase_m, self._chassis.steering_rad)
 
     def crossing(self, ego: VehicleState, others: Sequence[VehicleState], target_mps: float, margin_s: float) -> bool:
-        """Whether somebody would cross, by a margin in time, if the car went on towards a speed now."""
+        """True if somebody would cross, by a margin in time, if the car went on towards a speed now."""
         assert self._corridor is not None
         found = self._corridor.ahead(
             self.locate(ego), ego.speed_mps, others, within_m=_LOOK_M, target_mps=target_mps, margin_s=margin_s

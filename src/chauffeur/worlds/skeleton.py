@@ -81,12 +81,12 @@ class PlaceJudge:
 
     @property
     def over(self) -> bool:
-        """Whether the trip is decided."""
+        """True if the trip is decided."""
         raise NotImplementedError
 
     @property
     def success(self) -> bool:
-        """Whether the car is where it was to be."""
+        """True if the car is where it was to be."""
         raise NotImplementedError
 
     @property

@@ -121,7 +121,7 @@ def parse_opendrive(text: str | bytes) -> OpenDriveMap:
 
 
 def _forward(road: OpenDriveRoad, record: LaneRecord) -> bool:
-    """Whether a lane is driven along the reference line."""
+    """True if a lane is driven along the reference line."""
     return (record.id < 0) != road.left_hand
 
 

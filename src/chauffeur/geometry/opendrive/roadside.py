@@ -59,7 +59,7 @@ class RoadSignal:
             return None
 
     def rules(self, lane: int) -> bool:
-        """Whether it is for a lane of its road, driven on the right."""
+        """True if it is for a lane of its road, driven on the right."""
         if (self.orientation == "+" and lane > 0) or (self.orientation == "-" and lane < 0):
             return False
         return not self.lanes or any(min(span) <= lane <= max(span) for span in self.lanes)

@@ -58,7 +58,7 @@ class RoadPerception(Perception, Protocol):
         ...
 
     def reachable(self, lane: LaneId) -> bool:
-        """Whether the ego may change to a lane from where it is."""
+        """True if the ego may change to a lane from where it is."""
         ...
 
     def distance_on(self, lane: LaneId, to_id: int) -> float:

@@ -57,7 +57,7 @@ class LeavingCar:
 
     @property
     def gone(self) -> bool:
-        """Whether it has left the lot."""
+        """True if it has left the lot."""
         return self.station_m > self.way.path.length_m - 1.5
 
     def state(self) -> VehicleState:

@@ -26,12 +26,12 @@ class ParkingReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car has parked, wherever."""
+        """True if the car has parked, wherever."""
         return self._parked is not None
 
     @property
     def success(self) -> bool:
-        """Whether it has parked where it was meant to."""
+        """True if it has parked where it was meant to."""
         return self._parked == self._spot.name
 
     def metrics(self) -> tuple[Metric, ...]:

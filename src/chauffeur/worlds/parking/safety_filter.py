@@ -109,7 +109,7 @@ class LotSafetyFilter:
     def _ends_well(
         self, ego: VehicleState, acceleration: float, wheel_rad: float, others: list[VehicleState], ground: Ground
     ) -> bool:
-        """Whether the car touches nobody and stays on the ground, through a period and then braking to a stand."""
+        """True if the car touches nobody and stays on the ground, through a period and then braking to a stand."""
         curvature = math.tan(self._reached(wheel_rad)) / self._chassis.wheelbase_m
         rear, body = self._chassis.rear(ego), self._chassis.body
         first = max(ego.speed_mps, 0.0)
@@ -139,7 +139,7 @@ class LotSafetyFilter:
 
 
 def _meets(own: Box, other: VehicleState, at_s: float) -> bool:
-    """Whether somebody may be where the car is, after a time."""
+    """True if somebody may be where the car is, after a time."""
     if other.kind != "car":
         return overlap(own, other.box.grown(MARGIN_M + WALK_MPS * at_s))
     speed = max(other.speed_mps, 0.0)

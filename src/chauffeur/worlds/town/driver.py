@@ -210,7 +210,7 @@ class TownDriver:
 
     @property
     def has_goal(self) -> bool:
-        """Whether its route leads somewhere, and is not just the way on."""
+        """True if its route leads somewhere, and is not just the way on."""
         return self._goal
 
     @property

@@ -46,7 +46,7 @@ class TownPerception(ObservedPerception):
         return self._graph
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the town has this lane, for cars."""
+        """True if the town has this lane, for cars."""
         found = self._road.get(lane)
         return found is not None and found.kind == "driving"
 
@@ -203,7 +203,7 @@ class TownPerception(ObservedPerception):
         return lane if self._road[lane].kind == "driving" else None
 
     def is_clear(self) -> bool:
-        """Whether no road user that crosses the way is being let go first."""
+        """True if no road user that crosses the way is being let go first."""
         return not self._driver.lets_go_first
 
     def junction_ahead(self) -> tuple[float, tuple[Turn, ...]] | None:

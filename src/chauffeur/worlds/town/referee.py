@@ -23,12 +23,12 @@ class TownReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car is there."""
+        """True if the car is there."""
         return self._arrived
 
     @property
     def success(self) -> bool:
-        """Whether the car is there."""
+        """True if the car is there."""
         return self._arrived
 
     def metrics(self) -> tuple[Metric, ...]:

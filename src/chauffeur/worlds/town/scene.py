@@ -114,12 +114,12 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def arrived(self) -> bool:
-        """Whether the ego has come to a stand at its goal."""
+        """True if the ego has come to a stand at its goal."""
         return self._stood is not None or (self._still_s >= STANDS_S and self._at_goal)
 
     @property
     def _at_goal(self) -> bool:
-        """Whether the ego is at the end of its way to a goal, moving or not."""
+        """True if the ego is at the end of its way to a goal, moving or not."""
         driver = self._driver
         if driver is None or self._route is None or not driver.has_goal or not driver.stretch.goal:
             return False
@@ -162,7 +162,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def _heads_elsewhere(self) -> bool:
-        """Whether somebody wished for another place than the scenario's goal."""
+        """True if somebody wished for another place than the scenario's goal."""
         return bool(self._place) or self._stood is not None
 
     # Looking ----------------------------------------------------------------------------------------------------------
@@ -211,7 +211,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def _over(self) -> bool:
-        """Whether nothing will move any more."""
+        """True if nothing will move any more."""
         raise NotImplementedError
 
     def _look(self) -> Observation:

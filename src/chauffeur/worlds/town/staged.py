@@ -57,7 +57,7 @@ class StagedActor(BaseModel):
 
     @property
     def at_once(self) -> bool:
-        """Whether it moves from the beginning."""
+        """True if it moves from the beginning."""
         return self.after_s <= 0.0 and math.isinf(self.near_m)
 
     @property

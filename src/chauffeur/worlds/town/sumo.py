@@ -137,7 +137,7 @@ class Sumo:
 
     @property
     def open(self) -> bool:
-        """Whether this process still runs it."""
+        """True if this process still runs it."""
         return self in _holder
 
     def close(self) -> None:

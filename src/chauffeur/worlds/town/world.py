@@ -421,7 +421,7 @@ class TownWorld(TownScene):
         return self._colours[number]
 
     def _on_another_level(self, lane: LaneId | None, x_m: float, y_m: float, ego: Pose) -> bool:
-        """Whether somebody in a lane is over the ego, or under it."""
+        """True if somebody in a lane is over the ego, or under it."""
         if lane is None or self._lane is None:
             return False
         if self.town.levels.all_level(self._lane, self._ego_station, lane):
@@ -442,7 +442,7 @@ class TownWorld(TownScene):
         return known[1]
 
     def _amid(self, name: LaneId, x_m: float, y_m: float) -> bool:
-        """Whether a place is well inside a lane: of those that follow one another no other is closer."""
+        """True if a place is well inside a lane: of those that follow one another no other is closer."""
         lane = self.town.road[name]
         station, offset = lane.centre.project(x_m, y_m)
         return _AMID_M < station < lane.length_m - _AMID_M and abs(offset) < lane.width_m / 2.0

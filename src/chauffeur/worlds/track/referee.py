@@ -46,7 +46,7 @@ class StreetReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car stands for good, or never began to move."""
+        """True if the car stands for good, or never began to move."""
         needed = _STANDS_S if self._moved else _PATIENCE_S
         if not self._near:
             needed = max(needed, self._waits_s)
@@ -59,7 +59,7 @@ class StreetReferee(PlaceJudge):
 
     @property
     def success(self) -> bool:
-        """Whether it stands where it was to stand."""
+        """True if it stands where it was to stand."""
         paced = self._peak is None or abs(self._most - self._peak) <= PACE_MPS
         return self.over and self._near and paced
 

@@ -156,7 +156,7 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
 
     @property
     def open_road(self) -> bool:
-        """Whether it is a street, on which no manoeuvre is set."""
+        """True if it is a street, on which no manoeuvre is set."""
         return self._started().street is not None
 
     @property

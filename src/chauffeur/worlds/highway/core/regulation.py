@@ -85,7 +85,7 @@ def _foresee_ego(floats: Array, ints: Array, out: Array) -> None:
 def _corner_inside(
     ax: float, ay: float, a_heading: float, bx: float, by: float, b_heading: float, length: float, width: float
 ) -> bool:
-    """Whether a corner, edge middle or the centre of rectangle a lies in b (turned the wrong way, see above)."""
+    """True if a corner, edge middle or the centre of rectangle a lies in b (turned the wrong way, see above)."""
     ca, sa = math.cos(a_heading), math.sin(a_heading)
     cb, sb = math.cos(b_heading), math.sin(b_heading)
     for u in range(-1, 2):
