@@ -192,7 +192,7 @@ class PainterRenderer(Renderer):
 
     @property
     def engine(self) -> str:
-        """What renders, for people."""
+        """Name of the renderer, for people."""
         return "NumPy (no EGL: simpler pictures)"
 
     def close(self) -> None:

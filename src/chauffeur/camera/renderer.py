@@ -66,7 +66,7 @@ class Shot:
 
 @dataclass(frozen=True, slots=True)
 class Masks:
-    """What a picture shows where, before the lens: numbers, classes and depths (H, W).
+    """Masks of a picture before the lens, each (H, W).
 
     Attributes:
         instances, classes, depth_m: See `ImageTruth`.
@@ -88,10 +88,10 @@ class Renderer(ABC):
     @property
     @abstractmethod
     def engine(self) -> str:
-        """What renders, for people."""
+        """Name of the renderer, for people."""
 
     def _drawing(self, scene: CameraScene, light: Light) -> AbstractContextManager[object]:
-        """What all pictures of an instant are taken within."""
+        """Context in which all pictures of an instant are taken."""
         del scene, light
         return nullcontext()
 
@@ -229,7 +229,7 @@ class GlRenderer(Renderer):
 
     @property
     def engine(self) -> str:
-        """What renders, for people."""
+        """Name of the renderer, for people."""
         return self._engine
 
     def close(self) -> None:

@@ -87,7 +87,7 @@ class Conditions:
 
     @property
     def wet(self) -> float:
-        """How wet the road is, 0 to 1."""
+        """Wetness of the road, 0 to 1."""
         return min(1.0, 0.35 + 0.75 * self.rain) if self.rain > 0.0 else 0.0
 
     @property

@@ -1,4 +1,4 @@
-"""Whether a world keeps the `World` contract: what `chauffeur check world` runs, and the tests of every built-in one.
+"""Checks of the `World` contract, run by `chauffeur check world` and by the tests of every built-in world.
 
 Each check gets a maker of fresh worlds and a scenario, and yields what is wrong, in words.
 """
@@ -35,7 +35,7 @@ _COMMANDS: Final = tuple(Command(1.0 - (i % 7) / 3.0, 0.02 * math.sin(i)) for i 
 
 @dataclass(frozen=True, slots=True)
 class ConformanceFinding:
-    """What a check found.
+    """Result of one check.
 
     Attributes:
         check: Its name.
@@ -47,7 +47,7 @@ class ConformanceFinding:
 
 
 def check_world(make: MakeWorld, scenario: Scenario) -> tuple[ConformanceFinding, ...]:
-    """What every check of the kit finds; one that breaks has found that."""
+    """Run every check of the kit; a check that raises reports the error as its finding."""
     return tuple(ConformanceFinding(name, _found(check, make, scenario)) for name, check in CHECKS.items())
 
 
@@ -70,7 +70,7 @@ def _steps(world: World) -> Iterator[Observation]:
 
 
 def _given(thing: object) -> object:
-    """What a third party's world hands out may be anything."""
+    """Forget the static type: a third party's world may return anything."""
     return thing
 
 
@@ -104,7 +104,7 @@ def keeps_time(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
 
 
 def leaves_observations_alone(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
-    """What was shown does not change when the world goes on, and the road is one object throughout."""
+    """Observations do not change as the world goes on, and the road is one object throughout."""
     world = make()
     first = world.reset(scenario)
     shown = repr(first)
@@ -186,7 +186,7 @@ def ends_once(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
 
 
 def bounds_commands(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
-    """What is applied is a car's, whatever is asked for; what is no number is refused."""
+    """Applied commands are within what a car can do; non-finite ones are refused."""
     for asked in (Command(1e3, 10.0), Command(-1e3, -10.0), Command(0.0, 0.0)):
         world = make()
         world.reset(scenario)
@@ -270,7 +270,7 @@ def drives(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
 
 
 def is_what_it_says(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
-    """What it says of its capabilities holds on this road."""
+    """The stated capabilities hold on this road."""
     world = make()
     said, start = world.capabilities, world.reset(scenario)
     if start.kind not in said.roads:

@@ -73,7 +73,7 @@ class Chassis:
 
     @classmethod
     def of(cls, car: KinematicBicycle) -> Chassis:
-        """That of a car which is simulated by a kinematic bicycle."""
+        """Chassis of a car simulated as a kinematic bicycle."""
         body = Body(car.length_m, car.width_m, car.rear_to_middle_m)
         return cls(body, car.wheelbase_m, car.most_steering_rad, car.most_acceleration_mps2)
 
@@ -107,7 +107,7 @@ class Follower:
 
     @property
     def path(self) -> Polyline | None:
-        """What is followed."""
+        """The path followed."""
         return None if self._corridor is None else self._corridor.path
 
     @property
@@ -148,7 +148,7 @@ class Follower:
         headway_s: float,
         stop_m: float = math.inf,
     ) -> Command:
-        """What to do in this period.
+        """Command for this period.
 
         Args:
             ego: The car.

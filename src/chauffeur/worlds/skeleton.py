@@ -1,4 +1,4 @@
-"""What stepped worlds share: observation, perception and driver of a trip; commands and configurations from outside."""
+"""Base of stepped worlds: observation, perception and driver of a trip; validation of commands and configurations."""
 
 from __future__ import annotations
 
@@ -95,5 +95,5 @@ class PlaceJudge:
         return int(self.success), 1
 
     def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
+        """Outcome of the trip, collisions apart."""
         return "success" if self.success else "failure" if self.over else "timeout"

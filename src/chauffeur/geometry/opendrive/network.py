@@ -47,7 +47,7 @@ def lane_name(road: str, section: int | str, lane: int) -> LaneId:
 
 @dataclass(frozen=True)
 class OpenDriveMap:
-    """What a file says, in the plane.
+    """Content of a file, in the plane.
 
     Attributes:
         name: Of the header.
@@ -258,7 +258,7 @@ def _thinned(points: FloatArray) -> FloatArray:
 
 
 class _Links:
-    """Which lane leads into which, by the links of lanes, roads and junctions."""
+    """Successors of lanes, by the links of lanes, roads and junctions."""
 
     def __init__(self, document: Document) -> None:
         self._roads = document.roads

@@ -1,4 +1,4 @@
-"""What stands beside and lies on the road: signals, references to them, objects."""
+"""Roadside records: signals, references to them, objects."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def objects_of(document: Document) -> tuple[RoadObject, ...]:
 def _kept(
     document: Document, path: str, tags: tuple[str, ...], read: Callable[[OpenDriveRoad, ET.Element, Remarks], _T]
 ) -> Iterator[_T]:
-    """What stands at the roads; a record that cannot be read is left out, with a remark."""
+    """Records at the roads; a record that cannot be read is left out, with a remark."""
     remarks = document.remarks
     for road in document.roads.values():
         for node in road.node.findall(path):

@@ -1,4 +1,4 @@
-"""Whether a drawn scene is fit to begin with: nobody in anybody else, and nobody bound to run into somebody."""
+"""Fitness of a drawn scene: no overlap and no unavoidable collision."""
 
 from __future__ import annotations
 

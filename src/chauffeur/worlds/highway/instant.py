@@ -1,4 +1,4 @@
-"""What goals, scores and baselines read of a highway world, beyond what the driving APIs may ask."""
+"""Quantities that goals, scores and baselines read of a highway world, beyond the driving APIs."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from chauffeur.worlds.parking.lot import Lot
 
 
 class LaneMap:
-    """Which lane of a lot a place is in."""
+    """Maps places of a lot to lanes."""
 
     def __init__(self, lot: Lot) -> None:
         """Args: the lot."""

@@ -35,7 +35,7 @@ class ParkingReferee(PlaceJudge):
         return self._parked == self._spot.name
 
     def metrics(self) -> tuple[Metric, ...]:
-        """How well it stands: from the middle of the spot, across and along it, and how straight; and the time."""
+        """Offsets from the middle of the spot across and along it, heading error, and time."""
         observation, box = self._world.observe(), self._spot.box
         along, across = box.place_of(observation.ego.x_m, observation.ego.y_m)
         turned = abs(wrap_to_pi(observation.ego.heading_rad - box.heading_rad))

@@ -39,7 +39,7 @@ _LEVEL: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LotFilterResult:
-    """What may go to the actuator; rule and reason are empty where it is what was asked."""
+    """Command that may go to the actuator; rule and reason are empty where it is the one asked for."""
 
     command: Command
     rule: str = ""
@@ -96,7 +96,7 @@ class LotSafetyFilter:
         return LotFilterResult(command, rule, reason)
 
     def _reached(self, asked_rad: float) -> float:
-        """Where the wheel gets to within a period."""
+        """Steering angle reached within a period."""
         lock = self._chassis.steering_rad
         asked_rad = max(-lock, min(lock, asked_rad))
         return max(self._wheel - self._turn, min(self._wheel + self._turn, asked_rad))

@@ -159,12 +159,12 @@ class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
 
     @property
     def ground(self) -> Box:
-        """What is paved. Raises ScenarioError before the first reset."""
+        """The paved area. Raises ScenarioError before the first reset."""
         return self._started().lot.ground
 
     @property
     def steering_rate(self) -> float:
-        """How fast the ego's wheel turns, rad/s."""
+        """Steering rate of the ego, rad/s."""
         return STEERING_RATE
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
@@ -326,7 +326,7 @@ class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
 
 
 def _taken(config: LotConfig, rng: np.random.Generator, scenario: str) -> frozenset[str]:
-    """Which spots somebody stands in: a fixed share of all, none of those that are to be free."""
+    """Draw the occupied spots: a fixed share of all, none of those that are to be free."""
     names = sorted(build_lot(config.aisles, config.spots_a_row).spots)
     unknown = [name for name in config.free if name not in names]
     if unknown:

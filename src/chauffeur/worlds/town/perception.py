@@ -253,7 +253,7 @@ class TownPerception(ObservedPerception):
         return next((lane for lane in stretch.lanes[at:] if lane.junction), None)
 
     def _along(self, lane: LaneId, other: VehicleState) -> float | None:
-        """How far ahead of the ego somebody is in a lane, the one before or the one after it; None if in none."""
+        """Distance from the ego to an agent in a lane, the one before or the one after it; None if in none."""
         own, ego = self._road[lane], self._look().ego
         if other.lane is None:
             return None

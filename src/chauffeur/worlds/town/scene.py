@@ -77,7 +77,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def town(self) -> MapPack:
-        """Where it is driven. Raises ScenarioError before the first reset."""
+        """Map pack of the trip. Raises ScenarioError before the first reset."""
         return set_up(self._town)
 
     # Places -----------------------------------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
         return None if self._stood is None else self._stood[0]
 
     def destination(self) -> Destination | None:
-        """Where the car is going; None where it goes nowhere, or is there."""
+        """Destination of the ego; None without one, or once it is reached."""
         driver, road = self._driver, self.town.road
         if driver is None or not driver.has_goal or self._stood is not None:
             return None

@@ -36,7 +36,7 @@ FIRST_SIGN: Final = 30_001
 
 @dataclass(frozen=True, slots=True)
 class StopPoint:
-    """Where the front bumper has to stop, station of the stretch, and why."""
+    """A place where the front bumper has to stop (station of the stretch), and why."""
 
     at_m: float
     why: str
@@ -65,7 +65,7 @@ class StopLineRules:
     def stops(
         self, seen: Observation, stretch: Stretch, station: float, nose: float, meetings: Sequence[Meeting]
     ) -> list[StopPoint]:
-        """Where to stop for lights and signs.
+        """Stop points for lights and signs.
 
         Args:
             seen: The instant.
@@ -121,7 +121,7 @@ class StopLineRules:
         return stop
 
     def line_m(self, stretch: Stretch, what: Signal | Sign, start: float, end: float) -> float:
-        """Where a stop line is on the stretch: at the end of the lane where nobody says."""
+        """Station of a stop line on the stretch; the end of the lane where none is given."""
         if what.stop_line_m is None:
             return end
         known = self._lines.get((what.id, start))

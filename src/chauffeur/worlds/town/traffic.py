@@ -1,4 +1,4 @@
-"""Who else drives in a town: so many vehicles of all kinds, each on a way of its own that never ends."""
+"""Traffic of a town: vehicles of all kinds, each on an endless route of its own."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ _AMID_M: Final = 0.5
 
 @dataclass(slots=True)
 class _Actor:
-    """What a scenario put on the road."""
+    """A road user or thing that a scenario put on the road."""
 
     id: int
     kind: AgentKind
@@ -161,7 +161,7 @@ class TownWorld(TownScene):
 
     @property
     def vehicles(self) -> int:
-        """How many vehicles the traffic has."""
+        """Number of vehicles in traffic."""
         return self._traffic.count
 
     # The stage of a scenario ------------------------------------------------------------------------------------------
@@ -368,7 +368,7 @@ class TownWorld(TownScene):
         return (self._ego(), *(one for one in self._others if one.kind != "pedestrian"))
 
     def _look_round(self) -> None:
-        """Who is around, and whom the ego touches."""
+        """Update the agents around, and contacts with the ego."""
         assert self._sumo is not None
         self._shown = None
         middle = self._state.middle(LINCOLN_MKZ)
@@ -493,7 +493,7 @@ class TownWorld(TownScene):
 
 
 def _ruled(town: MapPack, links: tuple[Link, ...]) -> dict[str, str]:
-    """Which head rules each SUMO lane before a light."""
+    """Signal head that rules each SUMO lane before a light."""
     assert town.sumo is not None
     of_link = {(light, index): head for head, (light, indices) in town.sumo.links.items() for index in indices}
     return {link.lane: of_link[link.light, link.index] for link in links if (link.light, link.index) in of_link}

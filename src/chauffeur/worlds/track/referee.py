@@ -64,7 +64,7 @@ class StreetReferee(PlaceJudge):
         return self.over and self._near and paced
 
     def metrics(self) -> tuple[Metric, ...]:
-        """How far beyond and to the left of where it was to end the car stands, and the time."""
+        """Offsets of the car beyond and to the left of the goal, and time."""
         along, across = self._missed_m()
         return (
             Metric("street-success-v1", float(self.success), "points"),
@@ -79,7 +79,7 @@ class StreetReferee(PlaceJudge):
 
 
 def end_of(trajectory: Trajectory, start: Pose) -> Pose:
-    """Where a trajectory ends, and how the car is headed there.
+    """Pose at the end of a trajectory.
 
     Args:
         trajectory: Waypoints in the ego frame.

@@ -114,7 +114,7 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
 
     @property
     def steering_rate(self) -> float:
-        """How fast the ego's wheel turns, rad/s."""
+        """Steering rate of the ego, rad/s."""
         return STEERING_RATE
 
     @property
@@ -143,12 +143,12 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
 
     @property
     def ground(self) -> Box:
-        """What is paved: a proving ground around the lanes. Raises ScenarioError before the first reset."""
+        """The paved area: a proving ground around the lanes. Raises ScenarioError before the first reset."""
         return proving_ground(self._course.road.lanes)
 
     @property
     def manoeuvre(self) -> Manoeuvre:
-        """What is to be driven. Raises ScenarioError before the first reset, and on a street, where nothing is set."""
+        """The manoeuvre set. Raises ScenarioError before the first reset, and on a street, where nothing is set."""
         config = self._started()
         if config.street is not None:
             raise ScenarioError("On an open road no manoeuvre is set.", hint="Drive it with a trajectory or a program.")
@@ -166,7 +166,7 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
 
     @property
     def weather(self) -> Weather:
-        """What the sky does."""
+        """Weather of the scenario."""
         return self._started().weather
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
