@@ -78,6 +78,8 @@ class CarlaWorld(WorldBase[TownPerception, TownDriver]):
     """A CARLA server, stepped at 20 Hz."""
 
     capabilities = TOWN_CAPABILITIES
+    dt_s = DT_S
+    """Control period, s."""
 
     def __init__(self, client: Any = None) -> None:
         """Args: a `carla.Client`; by default one of the server that the environment names."""
@@ -90,11 +92,6 @@ class CarlaWorld(WorldBase[TownPerception, TownDriver]):
     def engine(self) -> str:
         """CARLA and the server's version."""
         return "carla" if self._client is None else f"carla-{self._client.get_server_version()}"
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
 
     @property
     def car(self) -> KinematicBicycle:

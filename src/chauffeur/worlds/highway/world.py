@@ -67,17 +67,14 @@ class HighwayWorld(WorldBase[HighwayPerception, HighwayDriver]):
         turns=True,
         stop_signs=True,
     )
+    dt_s = DT_S
+    """Control period, s."""
 
     def __init__(self) -> None:
         self._start: _Start | None = None
         self._core: CoreRoad | None = None
         self._tick = 0
         self._clock_s = 0.0
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
 
     @property
     def actuation(self) -> Actuation:

@@ -138,6 +138,12 @@ class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
         places=True,
         horizon_s=180.0,
     )
+    dt_s = DT_S
+    """Control period, s."""
+    chassis = CHASSIS
+    """The ego's size and axles."""
+    steering_rate = STEERING_RATE
+    """Steering rate of the ego, rad/s."""
 
     def __init__(self) -> None:
         self._scene: _Ground | None = None
@@ -148,24 +154,9 @@ class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
         self._tick = 0
 
     @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def chassis(self) -> Chassis:
-        """The ego's size and axles."""
-        return CHASSIS
-
-    @property
     def ground(self) -> Box:
         """The paved area. Raises ScenarioError before the first reset."""
         return self._started().lot.ground
-
-    @property
-    def steering_rate(self) -> float:
-        """Steering rate of the ego, rad/s."""
-        return STEERING_RATE
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Paint the lot, park the cars and place the ego at the entrance.

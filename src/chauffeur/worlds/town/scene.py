@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.places import Destination
@@ -36,6 +36,10 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
     """Road, lights, driver and perception of a trip. Who and what is where, its heirs say."""
 
     capabilities = TOWN_CAPABILITIES
+    dt_s = DT_S
+    """Control period, s."""
+    car = LINCOLN_MKZ
+    """The ego."""
 
     def __init__(self, town: MapPack | None = None) -> None:
         """Args: the town to drive in, whatever scenarios say; by default they do."""
@@ -59,16 +63,6 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
     def engine(self) -> str:
         """SUMO and its version. Its figures are no CARLA driving scores."""
         return engine_name()
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def car(self) -> KinematicBicycle:
-        """The ego."""
-        return LINCOLN_MKZ
 
     @property
     def chassis(self) -> Chassis:

@@ -89,6 +89,12 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
         turns=True,
         horizon_s=45.0,
     )
+    dt_s = DT_S
+    """Control period, s."""
+    chassis = CHASSIS
+    """The ego's size and axles."""
+    steering_rate = STEERING_RATE
+    """Steering rate of the ego, rad/s."""
 
     def __init__(self) -> None:
         self._config: TrackConfig | None = None
@@ -101,21 +107,6 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
         self._rng = np.random.default_rng(0)
         self._tick = 0
         self._crashed = False
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def chassis(self) -> Chassis:
-        """The ego's size and axles."""
-        return CHASSIS
-
-    @property
-    def steering_rate(self) -> float:
-        """Steering rate of the ego, rad/s."""
-        return STEERING_RATE
 
     @property
     def car(self) -> KinematicBicycle | None:
