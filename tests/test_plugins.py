@@ -1,4 +1,4 @@
-"""Four toy plug-ins in new files and entry points alone: a world, a policy kind, a planner that looks, questions.
+"""Toy plug-ins of every kind, in new files and entry points alone.
 
 `tests/bench/test_kernel.py` runs the benchmark of questions, `tests/worlds/test_conformance.py` checks the world.
 """
@@ -36,6 +36,7 @@ from chauffeur.concept import (
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
 from chauffeur.drive.loop import Stages, drive
+from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip, make_world
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
@@ -51,6 +52,10 @@ unvouched = one_lane:OneLane
 lookout = lookout:Lookout
 [chauffeur.benchmarks]
 right-of-way = right_of_way:RightOfWay
+[chauffeur.checks]
+people-first = people_first:check_people_first
+[chauffeur.commands]
+lanes = lanes:lanes
 """
 PLACE = Scenario("road", "one-lane", {}, 3)
 
@@ -89,8 +94,6 @@ def test_each_toy_is_found_by_its_name_and_is_short(toys: ModuleType) -> None:
 
 @pytest.mark.parametrize("scenario", [PLACE, Scenario("road", "highway", {}, 3)], ids=["one-lane", "highway"])
 def test_a_policy_kind_of_ones_own_is_checked_bounded_and_driven(toys: ModuleType, scenario: Scenario) -> None:
-    from chauffeur.drive.scenarios import find
-
     scenario = find("cruise") if scenario.world == "highway" else scenario
     world = make_world(scenario)
     start = world.reset(scenario)
@@ -113,6 +116,21 @@ def test_a_policy_kind_of_ones_own_is_judged_by_its_executor(
     world = make_world(PLACE)
     verdicts = run_checks(planned(toys.SpeedProfile(speeds, 1.0)), world.reset(PLACE), Limits(), DRIVE_CHECKS)
     assert words in declined(planned(None), verdicts)
+
+
+@pytest.mark.parametrize(("away_m", "stopped"), [(5.0, ["people-first-v1"]), (12.0, [])])
+def test_a_check_of_ones_own_stands_before_every_drive(toys: ModuleType, away_m: float, stopped: list[str]) -> None:
+    start = make_world(PLACE).reset(PLACE)
+    person = replace(start.ego, id=7, kind="pedestrian", y_m=away_m)
+    verdicts = check_drive(planned(toys.SpeedProfile((18.0,), 1.0)), replace(start, others=(person,)), Limits())
+    assert [verdict.check for verdict in verdicts if verdict.stops] == stopped
+
+
+def test_a_command_of_ones_own_is_listed_and_runs(toys: ModuleType) -> None:
+    assert "lanes of a scenario" in CliRunner().invoke(app, ["--help"]).output
+    result = CliRunner().invoke(app, ["lanes", "cruise"])
+    assert result.exit_code == 0, result.output
+    assert len(result.output.splitlines()) == len(make_world(find("cruise")).reset(find("cruise")).road.lanes)
 
 
 def test_what_nobody_vouches_for_is_not_driven(toys: ModuleType) -> None:

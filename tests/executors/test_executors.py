@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 
 import pytest
 
@@ -19,6 +20,8 @@ from chauffeur.concept import (
     ScenarioError,
     Trajectory,
 )
+from chauffeur.drive.conformance import check_executor
+from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import drive_policy
 from chauffeur.executors import executor_for
 from chauffeur.executors.reference import ReferencePath
@@ -72,11 +75,6 @@ def test_limits_bound_what_gains_ask_for() -> None:
     world, _ = on_track("lane_change")
     episode = drive_policy(world, MODERATE, None, 9.0, Limits(max_speed_mps=10.0))
     assert episode.final.ego.speed_mps < 10.5
-
-
-def test_same_gains_same_trip() -> None:
-    ends = [drive_policy(on_track("lane_change")[0], MODERATE, None, 4.0, Limits()).final for _ in range(2)]
-    assert ends[0] == ends[1]
 
 
 @pytest.mark.parametrize(("make", "scenario"), [(ParkingWorld, LOTS[0]), (HighwayWorld, ROADS[0])])
@@ -136,11 +134,30 @@ def test_a_kind_without_an_executor_is_refused() -> None:
         executor_for(Telepathy(), world)
 
 
+EACH_KIND = (
+    Program("def go():\n    while True:\n        yield autopilot()\n"),
+    Parameters(30.0, 10.0, 1.0),
+    Trajectory(tuple((15.6 * i, 0.0) for i in range(1, 41)), 0.5),
+    MODERATE,
+)
+
+
 @pytest.mark.parametrize(
-    "policy", [Program("def go():\n    while True:\n        yield autopilot()\n"), Parameters(30.0, 10.0, 1.0),
-               Trajectory(tuple((15.6 * i, 0.0) for i in range(1, 41)), 0.5), MODERATE],
-    ids=lambda policy: policy.kind,
-)  # fmt: skip
+    ("place", "policy"),
+    [
+        *(("cruise", policy) for policy in EACH_KIND),
+        ("parking", Trajectory(tuple((1.5 * i, 0.0) for i in range(1, 9)), 0.5)),
+        ("parking", Parameters(3.0, 10.0, 1.0)),
+        ("track-lane-change", MODERATE),
+    ],
+    ids=lambda one: getattr(one, "kind", one),
+)
+def test_every_executor_keeps_the_contract(place: str, policy: Policy) -> None:
+    findings = check_executor(partial(executor_for, policy), policy, find(place))
+    assert {found.check: found.faults for found in findings if found.faults} == {}
+
+
+@pytest.mark.parametrize("policy", EACH_KIND, ids=lambda policy: policy.kind)
 def test_every_kind_is_driven_by_the_executor_of_its_kind_and_held_back(policy: Policy) -> None:
     """The same period everywhere: ask, bound, command. What is held to a stand brakes, whatever the policy asks for."""
     world = HighwayWorld()

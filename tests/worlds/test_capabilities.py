@@ -8,10 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Capabilities
-from chauffeur.drive.scenarios import BUILT_IN
-from chauffeur.drive.session import make_world
-
 SOURCES = Path(__file__).parents[2] / "src" / "chauffeur"
 NAMES = {"highway", "intersection", "parking", "ros", "track", "town", "carla"}
 
@@ -45,19 +41,6 @@ def test_nothing_outside_the_worlds_compares_a_worlds_name() -> None:
 @pytest.mark.parametrize("source", ["scenario.world == 'parking'", "shot.kind in ('highway', 'town')"])
 def test_such_a_comparison_is_found(source: str) -> None:
     assert len(list(_compared(ast.parse(source)))) == 1
-
-
-@pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda scenario: scenario.id)
-def test_what_a_world_says_of_itself_is_true_of_its_roads(scenario: object) -> None:
-    world = make_world(scenario)  # type: ignore[arg-type]
-    said = world.capabilities
-    assert isinstance(said, Capabilities)
-    start = world.reset(scenario)  # type: ignore[arg-type]
-    assert start.kind in said.roads
-    assert said.turns or not start.road.junctions
-    assert said.lane_changes or all(len(start.road.abreast(lane.id)) == 1 for lane in start.road.lanes)
-    assert said.stop_signs or start.stop_sign_m is None
-    assert said.places == (start.road.has_parking or hasattr(world, "head_for"))
 
 
 LAMPILOTS_OWN = ("bench/lampilot/", "bench/report/redrive.py", "models/onboard/")

@@ -12,12 +12,14 @@ pytest.importorskip("libsumo")
 pytest.importorskip("sumo")
 
 from carla_stand_in import StandInClient, StandInWorld
+from world_contract import WorldContract
 
 from chauffeur.concept import Command, Scenario, ScenarioError
 from chauffeur.geometry import Pose
-from chauffeur.worlds.base import Stage, World
+from chauffeur.worlds.base import Stage
 from chauffeur.worlds.carla import CarlaWorld, server
 from chauffeur.worlds.carla.server import SERVER_VARIABLE, address, connect, lacks
+from chauffeur.worlds.conformance import MakeWorld
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack
 
@@ -43,10 +45,18 @@ def scenario(town: MapPack, **config: object) -> Scenario:
     return Scenario("c", "carla", {"town": town.name, "start": start_of(town), "vehicles": 0, **config}, 5)
 
 
-def test_it_is_a_world_with_a_stage(client: StandInClient, town: MapPack) -> None:
+class TestContract(WorldContract):
+    known = ("capabilities",)
+    """It says places, as the town does, and goes to the goal of its scenario alone."""
+
+    @pytest.fixture
+    def tried(self, client: StandInClient, town: MapPack) -> tuple[MakeWorld, Scenario]:
+        return lambda: CarlaWorld(client), scenario(town)
+
+
+def test_it_has_a_stage(client: StandInClient, town: MapPack) -> None:
     world = CarlaWorld(client)
     world.reset(scenario(town))
-    assert isinstance(world, World)
     assert isinstance(world, Stage)
     assert world.engine == "carla-0.9.16"
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from world_contract import WorldContract
 
-from chauffeur.concept import Command, Observation, Scenario
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError
+from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.scenarios import BUILT_IN
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import Polyline, RoadGraph
-from chauffeur.worlds.conformance import check_world
+from chauffeur.worlds.conformance import MakeWorld, check_world
 from chauffeur.worlds.highway import HighwayWorld
 
 SCENES = {scenario.id: scenario for scenario in BUILT_IN}
@@ -24,21 +26,26 @@ def faults(make: Callable[[], Any], scenario: Scenario) -> dict[str, tuple[str, 
     return {found.check: found.faults for found in check_world(make, scenario) if found.faults}
 
 
-@pytest.mark.parametrize("name", ["overtake", "emergency-lane", "intersection", "parking"])
-def test_the_built_in_worlds_keep_the_contract(name: str) -> None:
-    scenario = SCENES[name]
-    assert faults(lambda: make_world(scenario), scenario) == {}
+class TestBuiltInWorlds(WorldContract):
+    @pytest.fixture(params=BUILT_IN, ids=lambda scenario: scenario.id)
+    def tried(self, request: pytest.FixtureRequest) -> tuple[MakeWorld, Scenario]:
+        scenario: Scenario = request.param
+        pytest.importorskip({"town": "libsumo", "track": "vehiclemodels"}.get(scenario.world, "math"))
+        return lambda: make_world(scenario), scenario
 
 
-def test_the_example_world_keeps_it_in_under_80_lines() -> None:
-    path = Path(__file__).parents[2] / "examples" / "one_lane.py"
-    assert len(path.read_text(encoding="utf-8").splitlines()) < 80
-    spec = importlib.util.spec_from_file_location("one_lane", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert faults(module.OneLane, Scenario("one-lane", "one-lane", {}, 0)) == {}
+@pytest.mark.parametrize("world", sorted({scenario.world for scenario in BUILT_IN}))
+@pytest.mark.parametrize("ask", ["observe", "perception", "driver"])
+def test_before_the_first_reset_a_built_in_world_says_what_is_missing(world: str, ask: str) -> None:
+    with pytest.raises(ScenarioError, match="no scenario"):
+        getattr(load_plugin("chauffeur.worlds", world)(), ask)()
+
+
+class TestTheExample(WorldContract):
+    @pytest.fixture
+    def tried(self, monkeypatch: pytest.MonkeyPatch) -> tuple[MakeWorld, Scenario]:
+        monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+        return importlib.import_module("one_lane").OneLane, Scenario("one-lane", "one-lane", {}, 0)
 
 
 class _Forgetful(HighwayWorld):

@@ -9,7 +9,7 @@ import pytest
 from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Setpoints
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.actuate import actuate
-from chauffeur.worlds.base import EGO, Driver, Perception, World
+from chauffeur.worlds.base import EGO
 from chauffeur.worlds.parking import BUILT_IN, ParkingWorld, overlap
 from chauffeur.worlds.parking.actors import LotWalker
 from chauffeur.worlds.parking.world import CHASSIS, DT_S, STEERING_RATE
@@ -36,25 +36,6 @@ def _drive(world: ParkingWorld, setpoints: Setpoints, periods: int) -> list[Obse
     return shots
 
 
-def test_it_keeps_the_contract() -> None:
-    world = _started()
-    assert isinstance(world, World)
-    assert isinstance(world.driver(), Driver)
-    assert isinstance(world.perception(), Perception)
-    assert world.driver() is world.driver()
-    first = world.observe()
-    assert first.kind == "parking"
-    assert first.road.lanes is world.observe().road.lanes
-    assert first.ego.lane == "entrance-n1"
-    assert world.observe() is first, "an instant is looked at once"
-
-
-def test_before_the_first_reset_it_says_so() -> None:
-    for ask in (ParkingWorld().observe, ParkingWorld().perception, ParkingWorld().driver, ParkingWorld().parked):
-        with pytest.raises(ScenarioError, match="no scenario"):
-            ask()
-
-
 @pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda scenario: scenario.id)
 def test_its_own_driver_parks(scenario: Scenario) -> None:
     world = ParkingWorld()
@@ -68,13 +49,8 @@ def test_its_own_driver_parks(scenario: Scenario) -> None:
     assert shots[-1].ego.lane == spot.lane
 
 
-def test_the_same_seed_is_the_same_trip_bit_for_bit() -> None:
-    def trip(seed: int) -> list[Observation]:
-        world = _started(seed, cars=2, walkers=3)
-        return _drive(world, Setpoints(target_speed_mps=3.0, target_lane=world.spot("stadium").lane), 80)
-
-    assert trip(11) == trip(11)
-    assert trip(11)[0].others != trip(12)[0].others
+def test_another_seed_is_another_lot() -> None:
+    assert _started(11).observe().others != _started(12).observe().others
 
 
 def test_a_copy_goes_its_own_way() -> None:
@@ -140,8 +116,6 @@ def test_the_ego_is_a_bicycle() -> None:
         stopped = actuate(world, None, Command(-99.0, 0.0), None, None)
     assert world.observe().ego.speed_mps == 0.0, "it brakes to a stand and does not reverse"
     assert stopped.applied.acceleration_mps2 == 0.0
-    with pytest.raises(ValueError, match="finite"):
-        actuate(world, None, Command(math.nan, 0.0), None, None)
 
 
 def test_driving_into_a_parked_car_is_a_collision() -> None:

@@ -1,4 +1,4 @@
-"""What road users, signals and signs look like: parts of each kind, put at their poses all at once."""
+"""Shapes of road users, signals and signs: parts of each kind, put at their poses all at once."""
 
 from __future__ import annotations
 
@@ -356,7 +356,7 @@ class BodyShape:
 
     @property
     def height_m(self) -> float:
-        """How tall."""
+        """Height, m."""
         return HEIGHTS_M[self.kind]
 
 

@@ -47,7 +47,7 @@ def heading_at_line(
 
 
 def signal_pose(road: RoadGraph, signal: Signal) -> Pose:
-    """Where the heads of a traffic light hang, seen by who it rules: over the far side of the junction."""
+    """Pose of a traffic light's heads: over the far side of the junction, facing the lanes it rules."""
     x, y, _ = ends_of_line(signal.stop_line_m)
     heading = heading_at_line(road, signal.lanes, signal.stop_line_m)
     here = Pose(x, y, heading)
@@ -111,7 +111,7 @@ def put_sign(
 
 
 def sign_pose(road: RoadGraph, sign: Sign) -> tuple[tuple[float, float], float]:
-    """Where a sign stands, moved beside the lane if the world puts it on one, and the heading it is read from."""
+    """Position of a sign, moved beside the lane if the world puts it on one, and the heading it is read from."""
     heading = 0.0
     for name in sign.lanes:
         lane = road.get(name)

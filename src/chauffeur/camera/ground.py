@@ -43,7 +43,7 @@ class Paving(IntEnum):
 
 
 class Marking(IntEnum):
-    """What is painted along an edge of a lane. Of lines between two lanes each paints its half."""
+    """Paint along an edge of a lane. Of lines between two lanes each paints its half."""
 
     NONE = 0
     DASHED = 1

@@ -69,7 +69,7 @@ class LaneField:
         return np.repeat(np.repeat(np.arange(len(places)), 9), count), samples
 
     def clearance(self, places: FloatArray) -> FloatArray:
-        """How far from the edge of the nearest lane each place is, m, (n,); `CELL_M` at most; negative on a lane."""
+        """Distance of each place from the edge of the nearest lane, m, (n,); `CELL_M` at most; negative on a lane."""
         queries, samples = self.pairs(places)
         away = np.linalg.norm(places[queries] - self.places[samples], axis=1) - self.halves[samples]
         found = np.full(len(places), CELL_M)

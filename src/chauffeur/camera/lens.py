@@ -1,4 +1,4 @@
-"""What a lens and a sensor do to a picture: radial distortion and noise."""
+"""Lens and sensor effects: radial distortion and noise."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Lens:
         return picture[rows, columns]
 
     def points(self, pixels: FloatArray) -> FloatArray:
-        """Where pinhole pixels (n, 2) show."""
+        """Map pinhole pixels (n, 2) through the lens."""
         if self.distortion == 0.0:
             return pixels
         centre, half = np.array(self.camera.centre_px), self.camera.width / 2.0

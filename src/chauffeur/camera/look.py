@@ -1,4 +1,4 @@
-"""How the camera and the world are coloured: variations that hold a model's eyes to what matters."""
+"""Colour variations of camera and world, for training and testing models."""
 
 from __future__ import annotations
 

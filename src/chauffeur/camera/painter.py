@@ -4,18 +4,18 @@ picture at 448x256."""
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from chauffeur.camera.ground import Marking, Paving
-from chauffeur.camera.lens import Lens
-from chauffeur.camera.light import Light, light_of
+from chauffeur.camera.light import Light
 from chauffeur.camera.look import CameraLook
-from chauffeur.camera.pictures import CameraImages, ImageTruth
 from chauffeur.camera.precipitation import falling
-from chauffeur.camera.projection import NEAR_M, Viewpoint, viewpoints
-from chauffeur.camera.scene import CameraScene, SceneBuilder
+from chauffeur.camera.projection import NEAR_M, Viewpoint
+from chauffeur.camera.renderer import Masks, Renderer, Shot
+from chauffeur.camera.scene import CameraScene
 from chauffeur.camera.solids import (
     CLASS,
     GLOW,
@@ -35,17 +35,14 @@ from chauffeur.camera.solids import (
     X,
     Z,
     mesh_of,
-    together,
 )
-from chauffeur.camera.truth import truth_of
-from chauffeur.concept import CameraImage
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
-    from chauffeur.camera.rig import Rig
     from chauffeur.camera.weather import Conditions
-    from chauffeur.concept.scene import Observation
 
     FloatArray = NDArray[np.float64]
     IntArray = NDArray[np.int64]
@@ -190,63 +187,32 @@ def _rasterised(places: FloatArray, point: Viewpoint) -> tuple[IntArray, FloatAr
     return shown, depth
 
 
-class PainterRenderer:
+class PainterRenderer(Renderer):
     """Renders in NumPy."""
-
-    def __init__(self) -> None:
-        """Needs nothing."""
-        self._builder = SceneBuilder()
 
     @property
     def engine(self) -> str:
-        """What renders, for people."""
+        """Name of the renderer, for people."""
         return "NumPy (no EGL: simpler pictures)"
 
     def close(self) -> None:
         """Nothing to give back."""
 
-    def render(
-        self,
-        observation: Observation,
-        rig: Rig,
-        conditions: Conditions,
-        seed: int = 0,
-        *,
-        look: CameraLook = _DEFAULT_LOOK,
-        truth: bool = False,
-    ) -> CameraImages:
-        """As `Renderer.render` has it."""
-        scene = self._builder.scene(observation, conditions, look, seed)
-        light = light_of(conditions, look, seed, scene.view.place.surroundings)
-        everything = together([scene.view.solids, scene.movable])
-        images: list[CameraImage] = []
-        truths: list[ImageTruth] = []
-        for index, point in enumerate(viewpoints(rig, scene.ego)):
-            camera = point.camera
-            solids = everything.chosen(point.seen(everything))
-            triangles = _Triangles(scene, solids, ground=True)
-            shown, depth = _rasterised(triangles.places, point)
-            picture, markings = _shaded(scene, point, triangles, shown, depth, light, conditions)
-            _fall(picture, falling(camera, conditions, light, seed, scene.tick, index))
-            pixels = _graded(picture, look)
-            lens = Lens.of(camera, look)
-            pixels = lens.noisy(lens.bend(pixels), seed, scene.tick, index)
-            images.append(CameraImage(camera.name, scene.time_s, pixels))
-            if truth:
-                hit = shown >= 0
-                of = np.maximum(shown, 0)
-                instances = np.where(hit, triangles.marks[of, 0], 0).astype(np.uint16)
-                classes = np.where(hit, triangles.marks[of, 1], 0).astype(np.uint8)
-                classes[markings] = SemanticClass.LANE_MARKING
-                truths.append(
-                    truth_of(
-                        scene, point, observation, instances, classes, depth.astype(np.float32),
-                        lambda number, solids=solids, point=point: _alone(scene, solids, point, number), lens,
-                    )
-                )  # fmt: skip
-        return CameraImages(
-            tuple(images), tuple(truths), rig.cameras, conditions, seed, look.name, f"rendered by {self.engine}"
-        )
+    def _draw(self, shot: Shot) -> tuple[NDArray[np.uint8], Callable[[], Masks]]:
+        scene, point = shot.scene, shot.point
+        triangles = _Triangles(scene, shot.solids, ground=True)
+        shown, depth = _rasterised(triangles.places, point)
+        picture, markings = _shaded(scene, point, triangles, shown, depth, shot.light, shot.conditions)
+        _fall(picture, falling(point.camera, shot.conditions, shot.light, scene.seed, scene.tick, shot.index))
+
+        def masks() -> Masks:
+            hit, of = shown >= 0, np.maximum(shown, 0)
+            instances = np.where(hit, triangles.marks[of, 0], 0).astype(np.uint16)
+            classes = np.where(hit, triangles.marks[of, 1], 0).astype(np.uint8)
+            classes[markings] = SemanticClass.LANE_MARKING
+            return Masks(instances, classes, depth.astype(np.float32), partial(_alone, scene, shot.solids, point))
+
+        return _graded(picture, shot.look), masks
 
 
 def _alone(scene: CameraScene, solids: Solids, point: Viewpoint, number: int) -> int:

@@ -1,4 +1,4 @@
-"""What a renderer gives: pictures, and what is true of each of them."""
+"""Output of a renderer: pictures, and the ground truth of each."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class ImageLane:
 
 @dataclass(frozen=True)
 class ImageTruth:
-    """What is true of one picture.
+    """Ground truth of one picture.
 
     Attributes:
         camera: Name of the camera.

@@ -1,4 +1,4 @@
-"""What stands along a road: buildings, vegetation, street lamps, guardrails; a function of road graph and seed."""
+"""Surroundings of a road: buildings, vegetation, street lamps, guardrails; a function of road graph and seed."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class _Builder:
         self._posts: list[tuple[float, float, float]] = []
 
     def along(self, edge: Edge, surroundings: Surroundings) -> None:
-        """What stands along one edge of the road."""
+        """Surroundings along one edge of the road."""
         lane = self._road.lanes[edge.lane]
         if lane.kind == "parking" or not edge.open.any():
             return

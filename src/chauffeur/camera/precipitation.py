@@ -20,7 +20,7 @@ FALL: Final = 9
 
 
 def falling(camera: Camera, conditions: Conditions, light: Light, seed: int, tick: int, index: int) -> RowArray:
-    """What falls before a camera at one instant, (n, 9)."""
+    """Precipitation before a camera at one instant, (n, 9)."""
     parts: list[RowArray] = []
     rng = np.random.default_rng([seed, tick, index, 5])
     bright = np.clip(np.array(light.sky_light) * 1.15 + 0.10 * conditions.night, 0.0, 1.0)

@@ -74,7 +74,7 @@ class Viewpoint:
         return found
 
     def seen(self, solids: Solids) -> NDArray[np.bool_]:
-        """Which solids may be in sight and large enough to show, (n,)."""
+        """Mask of solids that may be in sight and large enough to show, (n,)."""
         if not len(solids):
             return np.zeros(0, bool)
         camera = self.camera

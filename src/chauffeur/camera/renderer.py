@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -39,13 +43,61 @@ _FAINT: Final = 0.06
 """Shadows weaker than this are not drawn."""
 
 
-class Renderer(Protocol):
-    """Takes pictures of observations."""
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture to take.
+
+    Attributes:
+        scene: What there is.
+        point: The camera in it.
+        index: Of the camera in its rig.
+        solids: Those that the camera may see.
+        light, conditions, look: How it is lit, seen through and graded.
+    """
+
+    scene: CameraScene
+    point: Viewpoint
+    index: int
+    solids: Solids
+    light: Light
+    conditions: Conditions
+    look: CameraLook
+
+
+@dataclass(frozen=True, slots=True)
+class Masks:
+    """Masks of a picture before the lens, each (H, W).
+
+    Attributes:
+        instances, classes, depth_m: See `ImageTruth`.
+        alone: Pixels that an instance covers when nothing else is there.
+    """
+
+    instances: NDArray[np.uint16]
+    classes: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+    alone: Callable[[int], int]
+
+
+class Renderer(ABC):
+    """Takes pictures of observations. Heirs draw a shot."""
+
+    def __init__(self) -> None:
+        self._builder = SceneBuilder()
 
     @property
+    @abstractmethod
     def engine(self) -> str:
-        """What renders, for people."""
-        ...
+        """Name of the renderer, for people."""
+
+    def _drawing(self, scene: CameraScene, light: Light) -> AbstractContextManager[object]:
+        """Context in which all pictures of an instant are taken."""
+        del scene, light
+        return nullcontext()
+
+    @abstractmethod
+    def _draw(self, shot: Shot) -> tuple[NDArray[np.uint8], Callable[[], Masks]]:
+        """The picture (H, W, 3) before the lens, and what makes its masks."""
 
     def render(
         self,
@@ -70,11 +122,30 @@ class Renderer(Protocol):
         Raises:
             ScenarioError: The observation has no road graph.
         """
-        ...
+        scene = self._builder.scene(observation, conditions, look, seed)
+        light = light_of(conditions, look, seed, scene.view.place.surroundings)
+        everything = together([scene.view.solids, scene.movable])
+        images: list[CameraImage] = []
+        truths: list[ImageTruth] = []
+        with self._drawing(scene, light):
+            for index, point in enumerate(viewpoints(rig, scene.ego)):
+                camera, solids = point.camera, everything.chosen(point.seen(everything))
+                pixels, masks = self._draw(Shot(scene, point, index, solids, light, conditions, look))
+                lens = Lens.of(camera, look)
+                pixels = lens.noisy(lens.bend(pixels), seed, scene.tick, index)
+                images.append(CameraImage(camera.name, scene.time_s, pixels))
+                if truth:
+                    one = masks()
+                    truths.append(
+                        truth_of(scene, point, observation, one.instances, one.classes, one.depth_m, one.alone, lens)
+                    )
+        return CameraImages(
+            tuple(images), tuple(truths), rig.cameras, conditions, seed, look.name, f"rendered by {self.engine}"
+        )
 
+    @abstractmethod
     def close(self) -> None:
         """Give its memory back."""
-        ...
 
 
 _FRAGMENTS: Final = {
@@ -114,11 +185,12 @@ _GROUND_LAYERS: Final = {
 }
 
 
-class GlRenderer:
+class GlRenderer(Renderer):
     """Renders by OpenGL. One a thread: a context belongs to the thread that made it."""
 
     def __init__(self) -> None:
         """Raises MissingExtraError: moderngl is not installed, or there is no EGL."""
+        super().__init__()
         try:
             import moderngl
         except ImportError as error:
@@ -137,7 +209,6 @@ class GlRenderer:
         gl = self._gl
         gl.front_face = "cw"  # the image's y grows downwards
         self._engine = f"OpenGL, {gl.info['GL_RENDERER']}"
-        self._builder = SceneBuilder()
         self._targets: dict[tuple[int, int], _Target] = {}
         self._noise = _noise_texture(gl)
         self._shadow_map = gl.depth_texture((_SHADOW_PX, _SHADOW_PX))
@@ -158,45 +229,22 @@ class GlRenderer:
 
     @property
     def engine(self) -> str:
-        """What renders, for people."""
+        """Name of the renderer, for people."""
         return self._engine
 
     def close(self) -> None:
         """Give its memory back."""
         self._gl.release()
 
-    def render(
-        self,
-        observation: Observation,
-        rig: Rig,
-        conditions: Conditions,
-        seed: int = 0,
-        *,
-        look: CameraLook = _DEFAULT_LOOK,
-        truth: bool = False,
-    ) -> CameraImages:
-        """As `Renderer.render` has it."""
-        scene = self._builder.scene(observation, conditions, look, seed)
-        light = light_of(conditions, look, seed, scene.view.place.surroundings)
-        everything = together([scene.view.solids, scene.movable])
+    @contextmanager
+    def _drawing(self, scene: CameraScene, light: Light) -> Generator[None]:
         with self._gl:
-            shadow_matrix = self._cast_shadows(scene, light)
+            self._shadow_matrix = self._cast_shadows(scene, light)
             self._ground.load(scene)
-            images: list[CameraImage] = []
-            truths: list[ImageTruth] = []
-            for index, point in enumerate(viewpoints(rig, scene.ego)):
-                camera = point.camera
-                solids = everything.chosen(point.seen(everything))
-                lens = Lens.of(camera, look)
-                pixels = self._picture(scene, point, solids, light, conditions, look, shadow_matrix, index)
-                pixels = lens.bend(pixels)
-                pixels = lens.noisy(pixels, scene.seed, scene.tick, index)
-                images.append(CameraImage(camera.name, scene.time_s, pixels))
-                if truth:
-                    truths.append(self._truth(scene, point, solids, lens, observation))
-        return CameraImages(
-            tuple(images), tuple(truths), rig.cameras, conditions, seed, look.name, f"rendered by {self._engine}"
-        )
+            yield
+
+    def _draw(self, shot: Shot) -> tuple[NDArray[np.uint8], Callable[[], Masks]]:
+        return self._picture(shot), lambda: self._masks(shot.point, shot.solids)
 
     # Passes -----------------------------------------------------------------------------------------------------------
 
@@ -226,17 +274,8 @@ class GlRenderer:
         bias[:3, 3] = 0.5
         return bias @ clip
 
-    def _picture(
-        self,
-        scene: CameraScene,
-        point: Viewpoint,
-        solids: Solids,
-        light: Light,
-        conditions: Conditions,
-        look: CameraLook,
-        shadow_matrix: FloatArray,
-        index: int,
-    ) -> NDArray[np.uint8]:
+    def _picture(self, shot: Shot) -> NDArray[np.uint8]:
+        scene, point, light, conditions = shot.scene, shot.point, shot.light, shot.conditions
         gl, camera = self._gl, point.camera
         target = self._target(camera)
         target.colour_frame.use()
@@ -244,12 +283,12 @@ class GlRenderer:
         target.colour_frame.clear(*light.air, depth=1.0)
         self._noise.use(0)
         self._shadow_map.use(1)
-        given = _uniforms(scene, point, light, conditions, look, shadow_matrix)
+        given = _uniforms(scene, point, light, conditions, shot.look, self._shadow_matrix)
         variant = " ".join(word for word, on in (("SHADOWS", light.shadows > _FAINT), ("HEAD", conditions.lamps)) if on)
         gl.enable_only(gl.DEPTH_TEST)
         gl.depth_func = "<"
         gl.enable(gl.CULL_FACE)
-        self._solids.draw(solids, given, variant)
+        self._solids.draw(shot.solids, given, variant)
         gl.disable(gl.CULL_FACE)
         self._ground.draw(given, variant)
         gl.depth_func = "<="
@@ -270,7 +309,7 @@ class GlRenderer:
             )
             array.render(gl.TRIANGLE_STRIP, instances=len(scene.glows))
             array.release()
-        drops = falling(camera, conditions, light, scene.seed, scene.tick, index)
+        drops = falling(camera, conditions, light, scene.seed, scene.tick, shot.index)
         if len(drops):
             gl.enable_only(gl.BLEND)
             rows = self._fall_rows.load(drops)
@@ -286,9 +325,7 @@ class GlRenderer:
         data = target.read_colour()
         return np.frombuffer(data, np.uint8).reshape(camera.height, camera.width, 3)
 
-    def _truth(
-        self, scene: CameraScene, point: Viewpoint, solids: Solids, lens: Lens, observation: Observation
-    ) -> ImageTruth:
+    def _masks(self, point: Viewpoint, solids: Solids) -> Masks:
         gl, camera = self._gl, point.camera
         target = self._target(camera)
 
@@ -321,7 +358,7 @@ class GlRenderer:
             own, _ = draw(False, only)
             return int((own[..., 3] > 0).sum())
 
-        return truth_of(scene, point, observation, instances, classes, depth, alone, lens)
+        return Masks(instances, classes, depth, alone)
 
     def _target(self, camera: Camera) -> _Target:
         size = camera.width, camera.height

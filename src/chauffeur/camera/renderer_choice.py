@@ -1,4 +1,4 @@
-"""Which renderer there is on this machine."""
+"""Choice of the renderer for this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pictures are made of: boxes, cylinders, wheels and balls, as rows of numbers that one draw call takes."""
+"""Solids of a scene: boxes, cylinders, wheels and balls, as rows of numbers that one draw call takes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Shape(IntEnum):
 
 
 class Material(IntEnum):
-    """How a solid takes light."""
+    """Material of a solid."""
 
     PAINT = 0
     FACADE = 1
@@ -77,7 +77,7 @@ class Solids:
     shapes: NDArray[np.uint8]
 
     def __len__(self) -> int:
-        """How many."""
+        """Number of solids."""
         return len(self.rows)
 
     def chosen(self, which: NDArray[np.bool_]) -> Solids:
@@ -135,7 +135,7 @@ class Pile:
         self._shapes += other._shapes
 
     def solids(self) -> Solids:
-        """What lies there."""
+        """The solids collected."""
         if not self._rows:
             return EMPTY
         return Solids(np.array(self._rows, np.float32), np.array(self._shapes, np.uint8))

@@ -87,10 +87,10 @@ class Conditions:
 
     @property
     def wet(self) -> float:
-        """How wet the road is, 0 to 1."""
+        """Wetness of the road, 0 to 1."""
         return min(1.0, 0.35 + 0.75 * self.rain) if self.rain > 0.0 else 0.0
 
     @property
     def lamps(self) -> bool:
-        """Whether vehicles drive with their head lamps on."""
+        """True if vehicles drive with their head lamps on."""
         return self.night >= 0.3 or self.visibility_m < 1_500.0

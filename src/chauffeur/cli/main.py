@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -46,6 +46,7 @@ from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.version import __version__
 
 EXAMPLES = help_text("main")
@@ -59,8 +60,30 @@ MODEL_EXAMPLES = help_text("main MODEL_EXAMPLES")
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
 """What somebody comes for; the headings of `chauffeur --help`."""
 
+COMMANDS: Final = "chauffeur.commands"
+"""Entry points of further commands: functions that Typer makes commands of."""
+
+
+class ChauffeurGroup(FriendlyGroup):
+    """The commands written here, and one for each that an installed package registers."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all of them."""
+        known = super().list_commands(ctx)
+        return [*known, *(name for name in plugin_names(COMMANDS) if name not in known)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name; None where there is none."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None or cmd_name not in plugin_names(COMMANDS):
+            return command
+        own = typer.Typer(rich_markup_mode="markdown")
+        own.command(cmd_name)(load_plugin(COMMANDS, cmd_name))
+        return typer.main.get_command(own)
+
+
 app = typer.Typer(
-    cls=FriendlyGroup,
+    cls=ChauffeurGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,

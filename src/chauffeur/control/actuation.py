@@ -1,4 +1,4 @@
-"""How LaMPilot's vehicle turns controller output into motion.
+"""LaMPilot's mapping from controller output to motion.
 
 LaMPilot's autopilot returns an acceleration in m/s2 and a steering angle in rad, but its environment reads the pair as
 normalised pedal and wheel positions: it clips both to [-1, 1] and multiplies them by 5 m/s2 and by 45 degrees (60 at

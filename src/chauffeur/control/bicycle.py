@@ -24,7 +24,7 @@ SLOWEST_MPS: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class BicycleParameters:
-    """What the controller believes of the car. A mid-size saloon, rounded: no plant's exact values.
+    """Car parameters assumed by the controller. A mid-size saloon, rounded: no plant's exact values.
 
     Attributes:
         mass_kg: Car and people.

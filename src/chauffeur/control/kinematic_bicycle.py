@@ -60,7 +60,7 @@ class BicycleState:
     acceleration_mps2: float = 0.0
 
     def yaw_rate_radps(self, parameters: KinematicBicycle) -> float:
-        """How fast it turns."""
+        """Yaw rate, rad/s."""
         return self.speed_mps * curvature_of(self.speed_mps, self.steering_rad, parameters)
 
     def middle(self, parameters: KinematicBicycle) -> Pose:

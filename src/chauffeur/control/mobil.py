@@ -38,7 +38,7 @@ class LaneChangeOutlook:
 
 
 def should_change(outlook: LaneChangeOutlook, parameters: MobilParameters) -> bool:
-    """Whether the change is safe for the new follower and worth it."""
+    """True if the change is safe for the new follower and worth it."""
     loss = 0.0
     if outlook.follower_now is not None and outlook.follower_after is not None:
         if outlook.follower_after <= -parameters.safe_deceleration_mps2:

@@ -36,7 +36,7 @@ class MpcWeights(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SteeringLimits:
-    """What the wheels may do.
+    """Limits of steering angle and rate.
 
     Attributes:
         angle_rad: Full lock.
@@ -50,7 +50,7 @@ class SteeringLimits:
 
 
 class PathErrors(NamedTuple):
-    """Where the car is beside its path: e_y (m, left positive), its rate, e_psi (rad), its rate."""
+    """Tracking errors: e_y (m, left positive), its rate, e_psi (rad), its rate."""
 
     lateral_m: float
     lateral_mps: float
@@ -108,7 +108,7 @@ Source = Literal["solved", "previous", "none"]
 
 
 class MpcStep(NamedTuple):
-    """What to steer: commanded front-wheel angle, rad, and where it comes from; `none` leaves it to somebody else."""
+    """Commanded front-wheel angle, rad, and its source; `none` leaves steering to the caller."""
 
     steering_rad: float
     source: Source

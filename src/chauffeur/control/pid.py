@@ -18,7 +18,7 @@ class PidGains(NamedTuple):
 
 
 class PidLimits(NamedTuple):
-    """What the output may be, and how the derivative is filtered.
+    """Bounds on the output, and the filter of the derivative.
 
     Attributes:
         low_mps2, high_mps2: Output range; low is negative.

@@ -73,7 +73,7 @@ def look_ahead_point(
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, x: float, y: float, radius: float) -> tuple[float, float]:
-    """Where the way from `a`, inside a circle, to `b`, outside it, crosses it."""
+    """Point where the segment from `a`, inside a circle, to `b`, outside it, crosses it."""
     ux, uy = bx - ax, by - ay
     px, py = ax - x, ay - y
     a = ux * ux + uy * uy

@@ -18,7 +18,7 @@ from chauffeur.drive.planning import PLAN_WITHIN_S, declined, unusable
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, check_drive, make_world
 from chauffeur.executors.base import Executor
-from chauffeur.executors.registry import MakeExecutor, OfKind, executor_for
+from chauffeur.executors.registry import BUILT_IN, MakeExecutor, OfKind, executor_for
 from chauffeur.planners.base import Planner
 from chauffeur.worlds.conformance import ConformanceFinding
 
@@ -159,6 +159,8 @@ def check_executor(make: MakeExecutor, policy: OfKind, scenario: Scenario) -> tu
 
 def _vouches(make: MakeExecutor, policy: OfKind, scenario: Scenario) -> Iterator[str]:
     """A kind of a third party is driven only where its executor says what is wrong with a policy."""
+    if policy.kind in BUILT_IN:  # `safety.format` judges these
+        return
     judge: Any = getattr(make, "fault", None)
     if judge is None:
         yield "It has no `fault(policy, observation, limits)`: nothing of its kind passes the checks."

@@ -57,7 +57,7 @@ from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import Vocabulary, vocabulary_of
 from chauffeur.programs.sandbox import Sandbox
 from chauffeur.safety.base import Check
-from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.checks import drive_checks, run_checks
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK, check_driven, check_faithfulness
 from chauffeur.safety.shield import SHIELD_VERSION, Shield, shield_for
 from chauffeur.worlds.base import World
@@ -221,7 +221,7 @@ class Session:
 
 def check_drive(plan: Plan, observation: Observation, limits: Limits) -> tuple[Verdict, ...]:
     """All verdicts before a drive: of the checks that can stop it, and whether the explanation fits the program."""
-    return run_checks(plan, observation, limits, DRIVE_CHECKS) + informed(
+    return run_checks(plan, observation, limits, drive_checks()) + informed(
         FAITHFULNESS_CHECK, plan, observation, limits, check_faithfulness
     )
 

@@ -55,7 +55,7 @@ class ActionMatrixExecutor(ExecutorBase):
 
     @property
     def tracker(self) -> PathTracker:
-        """What tracks. Raises ScenarioError before `start`."""
+        """The tracker. Raises ScenarioError before `start`."""
         if self._tracker is None:
             raise ScenarioError("Nothing is driven yet.", hint="Call start(policy, observation, limits) first.")
         return self._tracker

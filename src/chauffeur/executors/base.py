@@ -1,4 +1,4 @@
-"""What drives one kind of policy: executors, and what they share.
+"""Executors, each driving one kind of policy, and their base.
 
 Every control period goes the same way, in simulated time, in real time and in benchmarks:
 
@@ -57,7 +57,7 @@ class SetsManoeuvre(Protocol):
 
 
 class PolicyTick(Protocol):
-    """What a policy gives in one control period."""
+    """Output of a policy in one control period."""
 
     @property
     def setpoints(self) -> Setpoints: ...
@@ -127,22 +127,22 @@ class Executor(RunningPolicy, Protocol):
 
     @property
     def setpoints(self) -> Setpoints:
-        """What is aimed for in this period, for limits, screen and record."""
+        """Set-points of this period, for limits, screen and record."""
         ...
 
     @property
     def status(self) -> ExecutorStatus:
-        """Whether there is more to drive."""
+        """`running` while there is more to drive, then `finished`."""
         ...
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
-        """What there was to tell the passenger, as (time s, text)."""
+        """Messages to the passenger, as (time s, text)."""
         ...
 
 
 class ExecutorBase:
-    """What executors share: set-points, status and notes. They aim in `_aim`, and command in `step`."""
+    """Base of executors: set-points, status and notes. They aim in `_aim`, and command in `step`."""
 
     def __init__(self, world: World) -> None:
         """Args: the world, which is looked at and never stepped."""

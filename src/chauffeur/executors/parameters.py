@@ -17,7 +17,7 @@ _ROUNDED_MPS: Final = 0.02
 
 
 def parameters_executor(world: World) -> PursuitExecutor | TownSetPoints:
-    """What drives parameters there; its `route` is what is left of theirs."""
+    """Executor of parameters for a world; its `route` is what is left of theirs."""
     return TownSetPoints(world) if isinstance(world, TownPlaces) else PursuitExecutor(world)
 
 
@@ -59,7 +59,7 @@ class PursuitExecutor(ExecutorBase):
 
     @property
     def route(self) -> str:
-        """Where it goes: the spot that is made for by its name, or what the policy said."""
+        """The route: name of the spot that is headed for, or what the policy said."""
         driver = self._driving()
         return driver.route if driver.spot is None else driver.spot.name
 
@@ -73,7 +73,7 @@ class PursuitExecutor(ExecutorBase):
 
 
 class TownSetPoints(DriverLed):
-    """What parameters ask of a town's own driver, which steers by itself: how fast, which lane, and the way.
+    """Set-points of parameters for a town's own driver: speed, lane and route.
 
     A target at the limit of the lane where it was planned is one for the limit, wherever the way leads.
     """

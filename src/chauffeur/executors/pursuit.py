@@ -162,11 +162,11 @@ class ParametersDriver:
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
-        """What there was to tell the passenger, as (time s, text)."""
+        """Messages to the passenger, as (time s, text)."""
         return tuple(self._notes)
 
     def setpoints(self) -> Setpoints:
-        """What is wanted in this period."""
+        """Set-points of this period."""
         observation = self._world.observe()
         if self._goal is not None and not self._mind_the_lane(observation, _lane_beside(self._goal, observation.ego)):
             self._goal = self._stretch
@@ -174,7 +174,7 @@ class ParametersDriver:
         return self._driven(observation, self._target, min(max(HEADWAY_S, least), most))
 
     def held_to(self, safe: Setpoints) -> Setpoints:
-        """What is wanted in this period where others say how fast, with what gap, and in which lane.
+        """Set-points of this period with speed, headway and lane given from outside.
 
         Args:
             safe: Theirs, within the limits: of the fallback levels, for one.
@@ -237,7 +237,7 @@ class ParametersDriver:
         return _highway_chassis(self._world.observe().ego).body.overhang_m
 
     def _goal_of(self, side: int, origin: LaneId | None) -> _Stretch | None:
-        """Where a lane wish leads: the lane beside the one it counts from, and what follows that."""
+        """Target of a lane wish: the lane beside the one it counts from, and what follows that."""
         assert self._stretch is not None
         ego = self._world.observe().ego
         first = self._road.get(origin)
@@ -318,7 +318,7 @@ class ParametersDriver:
         return True
 
     def _hindrance(self, observation: Observation, path: Polyline, width_m: float, reserve_m: float) -> str:
-        """Who keeps the car from entering a lane, in words; empty where the gap allows it, with a reserve."""
+        """Obstacle to entering a lane, in words; empty where the gap allows it, with a reserve."""
         ego, table = observation.ego, LAMPILOT_SHIELD
         here = path.nearest(ego.x_m, ego.y_m)
         for other in _solid(observation):

@@ -52,7 +52,7 @@ class ReferencePath:
         self._station: float | None = None
 
     def locate(self, x_m: float, y_m: float) -> ReferencePlace:
-        """Where a point is beside the path; looked for near where it was before."""
+        """Locate a point relative to the path, searching near its last place."""
         if self._station is None:
             low, high = 0, len(self.x)
         else:
@@ -78,7 +78,7 @@ class ReferencePath:
         return float(np.interp(station_m, self.stations, self.speed))
 
     def acceleration_at(self, station_m: float) -> float:
-        """What the speeds ask for along the path, v dv/ds, m/s2."""
+        """Feed-forward acceleration of the speed profile, v dv/ds, m/s2."""
         before, behind = (self.speed_at(station_m + way) for way in (-STEP_M, STEP_M))
         return (behind * behind - before * before) / (4.0 * STEP_M)
 

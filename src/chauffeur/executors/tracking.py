@@ -45,7 +45,7 @@ DEFAULT_GAINS: Final = Gains(PidGains(0.6, 0.02, 0.05), MpcWeights(10.0, 20.0, 1
 
 
 def bicycle_for(chassis: Chassis) -> BicycleParameters:
-    """What is believed of a car of this wheelbase: mass and stiffness of a saloon, scaled."""
+    """Model parameters for a car of this wheelbase: mass and stiffness of a saloon, scaled."""
     base = BicycleParameters()
     scale = chassis.wheelbase_m / base.wheelbase_m
     return replace(

@@ -53,7 +53,7 @@ class TrajectoryExecutor(ExecutorBase):
 
     @property
     def tracker(self) -> PathTracker:
-        """What tracks."""
+        """The tracker."""
         return self._tracker
 
     def start(
@@ -141,7 +141,7 @@ def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> Reference
 
 
 def rebased(policy: Trajectory, there: Pose, here: Pose) -> Trajectory:
-    """What is left of a trajectory, in the ego frame of where the car is by now, at the same period and speeds.
+    """The rest of a trajectory in the present ego frame, at the same period and speeds.
 
     Args:
         policy: Waypoints in the ego frame of the moment it was planned.

@@ -36,17 +36,17 @@ class Box:
         return c * dx + s * dy, c * dy - s * dx
 
     def holds(self, x_m: float, y_m: float) -> bool:
-        """Whether a point lies in it or on its edge."""
+        """True if a point lies in it or on its edge."""
         along, across = self.place_of(x_m, y_m)
         return abs(along) <= self.length_m / 2.0 and abs(across) <= self.width_m / 2.0
 
     def contains(self, other: Box) -> bool:
-        """Whether all of another lies in it."""
+        """True if all of another lies in it."""
         return all(self.holds(x, y) for x, y in other.corners())
 
 
 def overlap(a: Box, b: Box) -> bool:
-    """Whether two boxes share ground; touching edges do not."""
+    """True if two boxes share ground; touching edges do not."""
     reach = (math.hypot(a.length_m, a.width_m) + math.hypot(b.length_m, b.width_m)) / 2.0
     if math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) >= reach:
         return False
@@ -54,7 +54,7 @@ def overlap(a: Box, b: Box) -> bool:
 
 
 def _separated(a: Box, b: Box) -> bool:
-    """Whether an edge of `a` parts them."""
+    """True if an edge of `a` parts them."""
     places = [a.place_of(x, y) for x, y in b.corners()]
     for axis, half in ((0, a.length_m / 2.0), (1, a.width_m / 2.0)):
         values = [place[axis] for place in places]

@@ -55,7 +55,7 @@ GroundFaultKind = Literal["off_road", "oncoming", "sidewalk", "bicycle", "emerge
 
 @dataclass(frozen=True, slots=True)
 class GroundFault:
-    """Where a body may not be.
+    """A place where a body may not be.
 
     Attributes:
         index: Which of the poses.
@@ -80,7 +80,7 @@ class Ground:
     def beyond_m(
         self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, either_way: bool = False
     ) -> Array:
-        """How far the outline of a body reaches beyond the ground it may be on, m, (n,); 0 where all of it is on it.
+        """Distance that a body's outline reaches beyond its permitted ground, m, (n,); 0 if it is all on it.
 
         Args:
             poses: (n, 3): x and y of the body's middle, m, and heading, rad.
@@ -103,11 +103,11 @@ class Ground:
         return GroundFault(index, self._kind(x, y), beyond)
 
     def off_road(self, x_m: float, y_m: float) -> bool:
-        """Whether a car whose middle is at a place has left all that cars drive or stand on, in whatever direction."""
+        """True if a car whose middle is at a place has left all that cars drive or stand on, in whatever direction."""
         return self.off_m(x_m, y_m) > OFF_ROAD_M
 
     def off_m(self, x_m: float, y_m: float) -> float:
-        """How far a place is beyond all ground that cars drive or stand on, whatever their direction, m."""
+        """Distance of a place from all ground that cars drive or stand on, whatever the direction, m."""
         return float(self.beyond_m(np.array([[x_m, y_m, 0.0]]), 0.0, 0.0, stops=True, either_way=True)[0])
 
     def _asked(self, poses: Array, length_m: float, width_m: float, *, stops: bool, either_way: bool = False) -> Array:
@@ -198,7 +198,7 @@ def _held(road: RoadGraph, lane: Lane) -> bool:
 
 
 def _half_m(lane: Lane, beside: Lane | None, x_m: float, y_m: float) -> float:
-    """How far a lane reaches to one side, m: to the edge of the lane beside, where mean widths leave a slit between."""
+    """Reach of a lane to one side, m: to the edge of the lane beside, where mean widths leave a slit between."""
     half = lane.width_m / 2.0
     if beside is None or beside.kind not in _FOR_CARS:
         return half
@@ -271,7 +271,7 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order):  # type: ign
 
 @numba.njit(cache=True, error_model="numpy")
 def _off(leg, px, py, c, s, stops, free):  # type: ignore[no-untyped-def]
-    """How far a place is beside a leg's lane; far where a body that is turned so may not be on it."""
+    """Distance of a place from a leg's lane; far where a body that is turned so may not be on it."""
     if leg[9] > 0.0 and not stops:
         return FAR_M
     if not free and c * leg[2] + s * leg[3] < leg[8]:

@@ -120,7 +120,7 @@ def choice_ahead(
 
 
 def turns_ahead(road: RoadGraph, lane: LaneId, route: Sequence[LaneId] = ()) -> tuple[Turn, ...]:
-    """What the ways at the next junction with a choice are called; empty where none is near.
+    """Names of the ways at the next junction with a choice; empty if none is near.
 
     Args:
         road: The road.

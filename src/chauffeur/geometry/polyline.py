@@ -24,7 +24,7 @@ _MANY_LEGS: Final = 40
 
 
 class _Leg(NamedTuple):
-    """What is asked of a leg again and again: where it begins, its way, stations, direction."""
+    """Cached quantities of a leg: start, vector, stations, direction."""
 
     x_m: float
     y_m: float
@@ -162,7 +162,7 @@ class Polyline:
         return middle[:, 0], middle[:, 1], np.diff(self.stations) / 2.0
 
     def offset(self, x_m: float, y_m: float, station_m: float) -> float:
-        """How far left of the polyline a place lies at a station, m; negative to its right."""
+        """Lateral offset of a place at a station, m; left is positive."""
         return self.at(station_m).sees(x_m, y_m)[1]
 
     def project(self, x_m: float, y_m: float) -> tuple[float, float]:
@@ -186,7 +186,7 @@ class Polyline:
         return Polyline.of(self.points_m[::-1])
 
     def crossings(self, other: Polyline) -> list[tuple[float, float]]:
-        """Where two polylines cross or touch: (own station, the other's), in the order of the own ones."""
+        """Points where two polylines cross or touch: (own station, the other's), in the order of the own ones."""
         import numpy as np
 
         a, b = self.points[:-1], np.diff(self.points, axis=0)

@@ -86,7 +86,7 @@ class Lane:
 
     @property
     def emergency(self) -> bool:
-        """Whether it is a shoulder."""
+        """True if it is a shoulder."""
         return self.kind == "emergency"
 
     @cached_property
@@ -97,7 +97,7 @@ class Lane:
 
 
 def turn_of(change_rad: float) -> Turn:
-    """Which way a change of heading, counter-clockwise positive, turns."""
+    """Turn of a change of heading, counter-clockwise positive."""
     change = wrap_to_pi(change_rad)
     if abs(change) <= TURN_RAD:
         return "straight"
@@ -164,7 +164,7 @@ class RoadGraph:
         return {lane.id: lane for lane in self.lanes}
 
     def __contains__(self, lane: object) -> bool:
-        """Whether it has a lane of this name."""
+        """True if it has a lane of this name."""
         return lane in self.by_id
 
     def __getitem__(self, lane: LaneId) -> Lane:
@@ -182,17 +182,17 @@ class RoadGraph:
 
     @cached_property
     def uninterrupted(self) -> bool:
-        """Whether traffic flows on it without end: no junction, no aisle (the Highway Capacity Manual's motorways)."""
+        """True if traffic flows on it without end: no junction, no aisle (the Highway Capacity Manual's motorways)."""
         return not self.junctions and all(lane.kind in ("driving", "emergency") for lane in self.lanes)
 
     @cached_property
     def has_shape(self) -> bool:
-        """Whether it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
+        """True if it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
         return bool(self.paved) or any(lane.width_m > 0.0 for lane in self.lanes)
 
     @cached_property
     def has_parking(self) -> bool:
-        """Whether there are spots to park in."""
+        """True if there are spots to park in."""
         return any(lane.kind == "parking" for lane in self.lanes)
 
     # Beside -----------------------------------------------------------------------------------------------------------
@@ -216,7 +216,7 @@ class RoadGraph:
 
     @cached_property
     def _changes(self) -> dict[LaneId, tuple[tuple[LaneId, float], ...]]:
-        """What `changes` found already."""
+        """Cache of `changes`."""
         return {}
 
     def changes(self, lane: LaneId) -> tuple[tuple[LaneId, float], ...]:
@@ -257,7 +257,7 @@ class RoadGraph:
         return room
 
     def places_between(self, lane: LaneId, other: LaneId) -> int | None:
-        """How many places to the right of a lane another lies; None where they are of different roads, or unknown."""
+        """Places that a lane lies to the right of another; None if they are on different roads, or unknown."""
         own, its = self.get(lane), self.get(other)
         if own is None or its is None or own.road != its.road or not (own.road or own is its):
             return None
@@ -373,7 +373,7 @@ class RoadGraph:
 
     @cached_property
     def _of_kinds(self) -> dict[tuple[LaneKind, ...], NDArray[np.bool_]]:
-        """Which lanes are of the kinds that somebody asked for."""
+        """Mask of the lanes of the requested kinds."""
         return {}
 
     def locate(
@@ -462,7 +462,7 @@ class RoadGraph:
 
     @cached_property
     def ground(self) -> Ground:
-        """Where a car may be: which lanes, in which direction, with its whole outline."""
+        """Drivable ground: lanes, direction, and whole outlines."""
         from chauffeur.geometry.ground import Ground
 
         return Ground(self)

@@ -207,7 +207,7 @@ def _search(road: RoadGraph, start: LanePlace, goal: LanePlace) -> tuple[float, 
 
 
 def _cramped(needed_m: float, room_m: float, stretch_m: float) -> float:
-    """What a change costs for want of room, all told and in its own stretch of lanes."""
+    """Cost of a change for want of room, in total and in its own stretch of lanes."""
     return CRAMPED_COST * max(0.0, needed_m - room_m) + _STRETCH_COST * max(0.0, needed_m - stretch_m)
 
 
@@ -216,7 +216,7 @@ def _room_needed(lane: Lane) -> float:
 
 
 def _changed(road: RoadGraph, before: LaneId, lane: LaneId) -> int:
-    """How many places to the right a route changes from one of its lanes to the next; 0 where it drives on."""
+    """Places to the right that a route changes from one lane to the next; 0 where it drives on."""
     if lane in road[before].successors:
         return 0
     return road.places_between(before, lane) or 0

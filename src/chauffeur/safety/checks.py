@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 
 from chauffeur.concept import Limits, Observation, Plan, Verdict
+from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.safety.base import Check
 from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import check_format
@@ -19,7 +20,15 @@ DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach, check_minimum_s
 """Checks before a drive for a person: also what no reading of constants finds, at some milliseconds a program, and
 the least speed among others. A benchmark's own rules know neither."""
 
+GROUP = "chauffeur.checks"
+"""Entry points of further checks."""
+
 _log = logging.getLogger(__name__)
+
+
+def drive_checks() -> tuple[Check, ...]:
+    """`DRIVE_CHECKS`, then those of installed packages, by name. Raises ConfigError: one of them cannot be loaded."""
+    return (*DRIVE_CHECKS, *(load_plugin(GROUP, name) for name in plugin_names(GROUP)))
 
 
 def run_checks(

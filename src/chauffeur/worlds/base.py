@@ -1,4 +1,4 @@
-"""What a world must offer. A world knows its own simulator and nothing of language.
+"""The contract of worlds. A world knows its own simulator and nothing of language.
 
 `World` is stepped with physical commands and shows frozen observations. `Perception` answers the questions that driving
 APIs ask, at the present instant, by vehicle id and lane id. `Driver` turns set-points into a command; it is the world's
@@ -36,7 +36,7 @@ class Perception(Protocol):
         ...
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the road has this lane."""
+        """True if the road has this lane."""
         ...
 
     def lane_of(self, vehicle_id: int) -> LaneId:
@@ -78,7 +78,7 @@ class Perception(Protocol):
 
 @runtime_checkable
 class StreetPerception(Perception, Protocol):
-    """What a town's perception answers beyond that. All distances are from the front bumper along the ego's way."""
+    """Further questions that a town's perception answers. Distances are from the front bumper along the ego's way."""
 
     def gap_ahead(self) -> tuple[float, float] | None:
         """(m between the bumpers, its speed) of who or what is ahead; None without."""
@@ -105,7 +105,7 @@ class StreetPerception(Perception, Protocol):
         ...
 
     def on_way(self, vehicle_id: int) -> tuple[float, float, float]:
-        """Where a road user is by the ego's way: (m from the front bumper to its middle, negative behind it; m to the
+        """Locate a road user by the ego's way: (m from the front bumper to its middle, negative behind it; m to the
         left of the way; m/s to the left). Raises KeyError for an id that nobody around has."""
         ...
 
@@ -123,7 +123,7 @@ class StreetPerception(Perception, Protocol):
         ...
 
     def is_clear(self) -> bool:
-        """Whether no road user that crosses the way is being let go first."""
+        """True if no road user that crosses the way is being let go first."""
         ...
 
     def place_ahead(self, name: str) -> float | None:
@@ -154,12 +154,12 @@ class World(Protocol):
 
     @property
     def engine(self) -> str:
-        """What moves the vehicles, with its version: every result names it."""
+        """Simulator that moves the vehicles, with its version; every result names it."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do, the same before and after a reset."""
+        """Capabilities, the same before and after a reset."""
         ...
 
     @property
@@ -181,7 +181,7 @@ class World(Protocol):
 
     @property
     def ended(self) -> bool:
-        """Whether the world will not step further: crash, off the road, end of road or of time."""
+        """True if the world will not step further: crash, off the road, end of road or of time."""
         ...
 
     def perception(self) -> Perception:
@@ -217,7 +217,7 @@ class WorldMirror(MirroredWorld, Protocol):
 
 @runtime_checkable
 class Stage(Protocol):
-    """What a world offers that lets somebody put road users of their own on its roads, for scenarios."""
+    """Lets a scenario put road users of its own on a world's roads."""
 
     def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0) -> int:
         """Put a road user, or with `static` a thing, at a pose of its middle; its id, as in snapshots.
@@ -230,7 +230,7 @@ class Stage(Protocol):
         ...
 
     def drive(self, actor: int, pose: Pose, speed_mps: float) -> None:
-        """Where a road user of the stage is at the end of the next control period, and how fast it is shown."""
+        """Set the pose of a staged road user at the end of the next control period, and the speed it is shown with."""
         ...
 
     def remove(self, actor: int) -> None:

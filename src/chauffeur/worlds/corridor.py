@@ -88,7 +88,7 @@ class Corridor:
         target_mps: float,
         margin_s: float = 1.0,
     ) -> list[Ahead]:
-        """Who is in the way from here on.
+        """Find the agents in the way from a station on.
 
         Args:
             station_m: Where the rear axle is along the path.
@@ -114,7 +114,7 @@ class Corridor:
         return found
 
     def _meets(self, other: VehicleState, first: int, last: int, station_m: float) -> Ahead | None:
-        """Whether somebody is in the way, or on their way in from the side."""
+        """Find an agent that is in the corridor, or drifts into it from the side."""
         index = self._first_touch(other, other.x_m, other.y_m, first, last)
         if index is None:
             if abs(other.speed_mps) < _DRIFT_MPS:
@@ -145,7 +145,7 @@ class Corridor:
         target_mps: float,
         margin_s: float,
     ) -> Ahead | None:
-        """Whether somebody will be in the way when the car gets there."""
+        """Find an agent that will be in the corridor when the car gets there."""
         last = min(last, first + math.ceil(_CROSSES_WITHIN_M / STEP_M))
         near = self._nearest(other.x_m, other.y_m, first, last)
         if abs(wrap_to_pi(other.heading_rad - float(self._heading[near]))) < _CROSSING_RAD:

@@ -43,7 +43,7 @@ class ObservedPerception:
         raise KeyError(vehicle_id)
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the road has this lane."""
+        """True if the road has this lane."""
         return lane in self._road
 
     def lane_of(self, vehicle_id: int) -> LaneId:

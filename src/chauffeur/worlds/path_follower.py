@@ -73,7 +73,7 @@ class Chassis:
 
     @classmethod
     def of(cls, car: KinematicBicycle) -> Chassis:
-        """That of a car which is simulated by a kinematic bicycle."""
+        """Chassis of a car simulated as a kinematic bicycle."""
         body = Body(car.length_m, car.width_m, car.rear_to_middle_m)
         return cls(body, car.wheelbase_m, car.most_steering_rad, car.most_acceleration_mps2)
 
@@ -107,7 +107,7 @@ class Follower:
 
     @property
     def path(self) -> Polyline | None:
-        """What is followed."""
+        """The path followed."""
         return None if self._corridor is None else self._corridor.path
 
     @property
@@ -148,7 +148,7 @@ class Follower:
         headway_s: float,
         stop_m: float = math.inf,
     ) -> Command:
-        """What to do in this period.
+        """Command for this period.
 
         Args:
             ego: The car.
@@ -179,7 +179,7 @@ class Follower:
         return angle_of(curvature, self._chassis.wheelbase_m, self._chassis.steering_rad)
 
     def crossing(self, ego: VehicleState, others: Sequence[VehicleState], target_mps: float, margin_s: float) -> bool:
-        """Whether somebody would cross, by a margin in time, if the car went on towards a speed now."""
+        """True if somebody would cross, by a margin in time, if the car went on towards a speed now."""
         assert self._corridor is not None
         found = self._corridor.ahead(
             self.locate(ego), ego.speed_mps, others, within_m=_LOOK_M, target_mps=target_mps, margin_s=margin_s

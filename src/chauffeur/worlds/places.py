@@ -1,4 +1,4 @@
-"""What some worlds offer beyond the `World` contract, asked for by capability: paved ground, spots, a town's places."""
+"""Optional parts of the `World` contract, found by capability: paved ground, parking spots, a town's places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from chauffeur.worlds.path_follower import Chassis
 
 @dataclass(frozen=True, slots=True)
 class Destination:
-    """Where a way through a town leads.
+    """Destination of a route through a town.
 
     Attributes:
         name: Of the place; empty where it has none.
@@ -39,12 +39,12 @@ class PavedGround(Protocol):
 
     @property
     def ground(self) -> Box:
-        """What is paved."""
+        """The paved area."""
         ...
 
     @property
     def steering_rate(self) -> float:
-        """How fast the ego's wheel turns, rad/s."""
+        """Steering rate of the ego, rad/s."""
         ...
 
 
@@ -60,7 +60,7 @@ class StreetCar(Protocol):
 
 @runtime_checkable
 class ParkingPlaces(PavedGround, Protocol):
-    """What a world with spots offers beyond the `World` contract."""
+    """A world with parking spots."""
 
     def spot(self, place: str) -> Spot:
         """The free spot that is meant. Raises ScenarioError, saying why there is none."""
@@ -81,7 +81,7 @@ class ParkingPlaces(PavedGround, Protocol):
 
 @runtime_checkable
 class TownPlaces(Protocol):
-    """What a world with places to go to offers beyond the `World` contract; its driver knows the way."""
+    """A world with places to go to; its driver knows the way."""
 
     def head_for(self, place: str) -> None:
         """Set out for a place. Raises ScenarioError: there is no such place, or no way there."""
@@ -96,5 +96,5 @@ class TownPlaces(Protocol):
         ...
 
     def destination(self) -> Destination | None:
-        """Where the car is going; None where it goes nowhere, or is there."""
+        """Destination of the ego; None without one, or once it is reached."""
         ...

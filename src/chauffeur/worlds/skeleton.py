@@ -1,21 +1,29 @@
-"""The parts that stepped worlds share: the instant shown, commands and configurations as they come from outside."""
+"""Base of stepped worlds: observation, perception and driver of a trip; validation of commands and configurations."""
 
 from __future__ import annotations
 
 import math
-from typing import Final, TypeVar
+from typing import Final, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError
 
 Config = TypeVar("Config", bound=BaseModel)
+PerceptionT = TypeVar("PerceptionT")
+DriverT = TypeVar("DriverT")
+SetUp = TypeVar("SetUp")
 
 
-class ShownWorld:
-    """A world that looks once an instant; heirs forget `_shown` whenever something has moved."""
+class WorldBase(Generic[PerceptionT, DriverT]):
+    """A world that looks once an instant.
+
+    Heirs set `_perception` and `_driver` at a reset, and forget `_shown` whenever something has moved.
+    """
 
     _shown: Observation | None = None
+    _perception: PerceptionT | None = None
+    _driver: DriverT | None = None
 
     def observe(self) -> Observation:
         """The present instant as frozen values."""
@@ -28,8 +36,23 @@ class ShownWorld:
         """Crash, off the road, at the goal, or out of time."""
         return self.observe().ended
 
+    def perception(self) -> PerceptionT:
+        """Questions about the present instant. Raises ScenarioError before the first reset."""
+        return set_up(self._perception)
+
+    def driver(self) -> DriverT:
+        """The low-level driver of the trip, the same until the next reset. Raises ScenarioError before the first."""
+        return set_up(self._driver)
+
     def _look(self) -> Observation:
         raise NotImplementedError
+
+
+def set_up(part: SetUp | None) -> SetUp:
+    """A part that a reset makes. Raises ScenarioError: there was none yet."""
+    if part is None:
+        raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
+    return part
 
 
 def finite(command: Command) -> Command:
@@ -58,12 +81,12 @@ class PlaceJudge:
 
     @property
     def over(self) -> bool:
-        """Whether the trip is decided."""
+        """True if the trip is decided."""
         raise NotImplementedError
 
     @property
     def success(self) -> bool:
-        """Whether the car is where it was to be."""
+        """True if the car is where it was to be."""
         raise NotImplementedError
 
     @property
@@ -72,5 +95,5 @@ class PlaceJudge:
         return int(self.success), 1
 
     def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
+        """Outcome of the trip, collisions apart."""
         return "success" if self.success else "failure" if self.over else "timeout"

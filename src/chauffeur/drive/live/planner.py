@@ -52,7 +52,7 @@ from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import vocabulary_of
-from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.checks import drive_checks, run_checks
 from chauffeur.worlds.places import TownPlaces
 
 FOLLOW_FOR_S: Final = 600.0
@@ -190,7 +190,7 @@ class Planning:
 
         async def now(plan: Plan, own: bool) -> Judged:
             del own
-            return run_checks(plan, observation, limits, DRIVE_CHECKS), observation
+            return run_checks(plan, observation, limits, drive_checks()), observation
 
         steps = PlanSteps(
             planner=self._planner,

@@ -72,7 +72,7 @@ from chauffeur.geometry import Pose
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_setpoints
 from chauffeur.safety.base import Check
-from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.checks import drive_checks, run_checks
 from chauffeur.safety.words import reasons_once
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.places import ParkingPlaces
@@ -149,11 +149,11 @@ class Policy:
         rings: PolicyRings,
         sandbox: Sandbox,
         *,
-        checks: Sequence[Check] = DRIVE_CHECKS,
+        checks: Sequence[Check] | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._mirror, self._rings, self._sandbox = mirror, rings, sandbox
-        self._checks, self._clock_ns = checks, clock_ns
+        self._checks, self._clock_ns = drive_checks() if checks is None else checks, clock_ns
         self._orders = Reader(rings.orders)
         self._trip = 0
         self._driven: _Driven | None = None

@@ -16,7 +16,7 @@ from typing import Final
 from chauffeur.concept import Limits, Observation, Plan, Program, Verdict
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.talk.messages import VerdictShown
-from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.checks import drive_checks, run_checks
 from chauffeur.safety.faithfulness import check_faithfulness
 
 JUDGED: Final = "live"
@@ -93,7 +93,7 @@ def verdicts_of(
         limits: Of the trip.
         event: What was told: `started` or `refused`.
     """
-    verdicts = () if observation is None else run_checks(plan, observation, limits, DRIVE_CHECKS)
+    verdicts = () if observation is None else run_checks(plan, observation, limits, drive_checks())
     told = tuple(_shown(verdict) for verdict in verdicts)
     if not verdicts or not _as_told(verdicts, event):
         told = (_told(event),)

@@ -26,12 +26,12 @@ class Cubics:
 
     @property
     def known(self) -> bool:
-        """Whether there is a piece at all."""
+        """True if there is a piece at all."""
         return bool(len(self._starts))
 
     @property
     def straight(self) -> bool:
-        """Whether it is the same everywhere."""
+        """True if it is the same everywhere."""
         return not self._factors[:, 1:].any() and len({*self._factors[:, 0].tolist()}) <= 1
 
     def __call__(self, stations: FloatArray) -> FloatArray:

@@ -43,7 +43,7 @@ _MOST_CURVATURE: Final = 100.0
 
 @dataclass(frozen=True, slots=True)
 class RoadEnd:
-    """What a road's end leads to: a road (and which of its ends), or a junction."""
+    """Link at a road's end: a road (and which of its ends), or a junction."""
 
     element: str
     id: str

@@ -47,7 +47,7 @@ def lane_name(road: str, section: int | str, lane: int) -> LaneId:
 
 @dataclass(frozen=True)
 class OpenDriveMap:
-    """What a file says, in the plane.
+    """Content of a file, in the plane.
 
     Attributes:
         name: Of the header.
@@ -121,7 +121,7 @@ def parse_opendrive(text: str | bytes) -> OpenDriveMap:
 
 
 def _forward(road: OpenDriveRoad, record: LaneRecord) -> bool:
-    """Whether a lane is driven along the reference line."""
+    """True if a lane is driven along the reference line."""
     return (record.id < 0) != road.left_hand
 
 
@@ -258,7 +258,7 @@ def _thinned(points: FloatArray) -> FloatArray:
 
 
 class _Links:
-    """Which lane leads into which, by the links of lanes, roads and junctions."""
+    """Successors of lanes, by the links of lanes, roads and junctions."""
 
     def __init__(self, document: Document) -> None:
         self._roads = document.roads

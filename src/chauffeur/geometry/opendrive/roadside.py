@@ -1,4 +1,4 @@
-"""What stands beside and lies on the road: signals, references to them, objects."""
+"""Roadside records: signals, references to them, objects."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class RoadSignal:
             return None
 
     def rules(self, lane: int) -> bool:
-        """Whether it is for a lane of its road, driven on the right."""
+        """True if it is for a lane of its road, driven on the right."""
         if (self.orientation == "+" and lane > 0) or (self.orientation == "-" and lane < 0):
             return False
         return not self.lanes or any(min(span) <= lane <= max(span) for span in self.lanes)
@@ -102,7 +102,7 @@ def objects_of(document: Document) -> tuple[RoadObject, ...]:
 def _kept(
     document: Document, path: str, tags: tuple[str, ...], read: Callable[[OpenDriveRoad, ET.Element, Remarks], _T]
 ) -> Iterator[_T]:
-    """What stands at the roads; a record that cannot be read is left out, with a remark."""
+    """Records at the roads; a record that cannot be read is left out, with a remark."""
     remarks = document.remarks
     for road in document.roads.values():
         for node in road.node.findall(path):

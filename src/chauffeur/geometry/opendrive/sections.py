@@ -306,7 +306,7 @@ def _cuts(section: Section, speeds: Speeds) -> Iterator[float]:
 
 
 def _allowed(section: Section, speeds: Speeds, station_m: float) -> tuple[object, ...]:
-    """What the lanes of a section allow at a station."""
+    """Lane changes that a section allows at a station."""
     found: list[object] = []
     for side in (section.left, section.right):
         for record, outer in zip_longest(side, side[1:]):

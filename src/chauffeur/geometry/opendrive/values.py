@@ -38,7 +38,7 @@ class OpenDriveError(ValueError):
 
 
 class Remarks:
-    """What was left out or read otherwise than written, each kind once, with the first places.
+    """Remarks on what was skipped or reinterpreted, each kind once, with its first places.
 
     Attributes:
         dropped: Elements that were left out.
@@ -58,7 +58,7 @@ class Remarks:
         return tuple(f"{what[:1].upper()}{what[1:]}: {_listed(places)}." for what, places in self._places.items())
 
     def tried(self, where: str, read: Callable[[], _T], node: ET.Element | None = None) -> _T | None:
-        """What a reader gives; None, and a remark, where it raises OpenDriveError: a record costs itself alone.
+        """Result of a reader; None, with a remark, if it raises OpenDriveError, so that only that record is lost.
 
         Args:
             where: Which record, for people.
@@ -114,7 +114,7 @@ def lane_id(node: ET.Element, key: str = "id") -> int:
 
 
 def offset_m(node: ET.Element, where: str, remarks: Remarks) -> float | None:
-    """Where a record of a lane begins, from the start of its section; None, and a remark, where that is no number."""
+    """Start of a lane record from its section's start, m; None, with a remark, if it is no number."""
     return remarks.tried(where, lambda: number(node, "sOffset", 0.0), node)
 
 

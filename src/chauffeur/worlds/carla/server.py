@@ -16,7 +16,7 @@ _TIMEOUT_S: Final = 10.0
 
 
 class CarlaAddress(NamedTuple):
-    """Where a server listens."""
+    """Address of a server."""
 
     host: str
     port: int
@@ -61,7 +61,7 @@ def connect() -> Any:
 
 
 def lacks(client: Any) -> tuple[str, ...]:
-    """What a server lacks to be driven in, a sentence each; nothing where it lacks nothing.
+    """Requirements a server does not meet, a sentence each; empty if it meets all.
 
     Raises:
         RuntimeError: The server stops answering.

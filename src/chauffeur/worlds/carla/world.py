@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from chauffeur.concept import (
     AgentKind,
@@ -31,7 +31,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.carla.frames import forward_mps, pose_of, transform_of
 from chauffeur.worlds.carla.server import EGO_BLUEPRINTS, connect, library
 from chauffeur.worlds.path_follower import Chassis
-from chauffeur.worlds.skeleton import ShownWorld, finite
+from chauffeur.worlds.skeleton import WorldBase, config_of, finite, set_up
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.perception import TownPerception
 
@@ -74,28 +74,24 @@ class CarlaConfig(BaseModel):
     contact_ends: bool = True
 
 
-class CarlaWorld(ShownWorld):
+class CarlaWorld(WorldBase[TownPerception, TownDriver]):
     """A CARLA server, stepped at 20 Hz."""
 
     capabilities = TOWN_CAPABILITIES
+    dt_s = DT_S
+    """Control period, s."""
 
     def __init__(self, client: Any = None) -> None:
         """Args: a `carla.Client`; by default one of the server that the environment names."""
         self._client = client
         self._actors: list[Any] = []
         self._world: Any = None
-        self._driver: TownDriver | None = None
         self._before: Any = None
 
     @property
     def engine(self) -> str:
         """CARLA and the server's version."""
         return "carla" if self._client is None else f"carla-{self._client.get_server_version()}"
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
 
     @property
     def car(self) -> KinematicBicycle:
@@ -114,10 +110,7 @@ class CarlaWorld(ShownWorld):
             ScenarioError: No server answers, it lacks the town or the car, or the configuration is malformed.
             MissingExtraError: The client library is not installed.
         """
-        try:
-            config = CarlaConfig.model_validate(scenario.config)
-        except ValidationError as error:
-            raise ScenarioError(f"Scenario {scenario.id!r} has a bad CARLA configuration: {error}.") from error
+        config = config_of(CarlaConfig, scenario, "CARLA")
         self._carla, self._config = library(), config
         if self._client is None:
             self._client = connect()
@@ -151,7 +144,7 @@ class CarlaWorld(ShownWorld):
         self._lights = [self._light(one) for one in world.get_actors().filter("traffic.traffic_light*")]
         self._fill(config.vehicles, scenario.seed if seed is None else seed)
         self._tick, self._crashed, self._steering = 0, False, 0.0
-        self._shown: Observation | None = None
+        self._shown = None
         world.tick()
         self._driver = TownDriver(self._road, LINCOLN_MKZ, DT_S, self.observe, self._route)
         self._perception = TownPerception(self._road, self.observe, self._driver)
@@ -183,15 +176,6 @@ class CarlaWorld(ShownWorld):
         self._tick += 1
         self._shown, self._steering = None, wheel
         return Command(asked, wheel)
-
-    def perception(self) -> TownPerception:
-        """Questions about the present instant."""
-        self._started()
-        return self._perception
-
-    def driver(self) -> TownDriver:
-        """The low-level driver of the present trip."""
-        return self._started()
 
     # The stage of a scenario ------------------------------------------------------------------------------------------
 
@@ -229,11 +213,6 @@ class CarlaWorld(ShownWorld):
         self._shown = None
 
     # Parts ------------------------------------------------------------------------------------------------------------
-
-    def _started(self) -> TownDriver:
-        if self._driver is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._driver
 
     def _ways(self, config: CarlaConfig) -> tuple[LanePlace, Route | None]:
         road = self._road
@@ -327,6 +306,7 @@ class CarlaWorld(ShownWorld):
         )
 
     def _look(self) -> Observation:
+        set_up(self._world)
         own = self._state(self._ego)
         off_road = self._road.ground.off_road(own.x_m, own.y_m)
         crashed = self._crashed and self._config.contact_ends

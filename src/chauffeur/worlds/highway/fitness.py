@@ -1,4 +1,4 @@
-"""Whether a drawn scene is fit to begin with: nobody in anybody else, and nobody bound to run into somebody."""
+"""Fitness of a drawn scene: no overlap and no unavoidable collision."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FAR_M: Final = 150.0
 
 
 def fit_to_begin(everybody: Sequence[VehicleState]) -> bool:
-    """Whether nobody has crashed, nobody overlaps, and whoever comes up behind another can still brake for it.
+    """True if nobody has crashed, nobody overlaps, and whoever comes up behind another can still brake for it.
 
     Args:
         everybody: The ego and all that is solid around it; stop signs are not.

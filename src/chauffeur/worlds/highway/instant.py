@@ -1,4 +1,4 @@
-"""What goals, scores and baselines read of a highway world, beyond what the driving APIs may ask."""
+"""Quantities that goals, scores and baselines read of a highway world, beyond the driving APIs."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class RoadPerception(Perception, Protocol):
         ...
 
     def reachable(self, lane: LaneId) -> bool:
-        """Whether the ego may change to a lane from where it is."""
+        """True if the ego may change to a lane from where it is."""
         ...
 
     def distance_on(self, lane: LaneId, to_id: int) -> float:

@@ -93,7 +93,7 @@ class HighwayPerception:
         return self.everybody()[1:]
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the road has this lane."""
+        """True if the road has this lane."""
         return lane in self._rows
 
     def lane_of(self, vehicle_id: int) -> LaneId:
@@ -131,7 +131,7 @@ class HighwayPerception:
         return 0.0 - self._core.lane_heading(self._rows[lane], EGO)
 
     def reachable(self, lane: LaneId) -> bool:
-        """Whether the ego may change to a lane from where it is."""
+        """True if the ego may change to a lane from where it is."""
         return self._core.reachable(self._rows[lane])
 
     def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:

@@ -46,7 +46,7 @@ _EXPONENTS = (3.5, 4.5)
 
 
 class EgoConfig(BaseModel):
-    """Where the ego starts on a highway. speed m/s; start_position (longitudinal, lateral) m."""
+    """Start of the ego on a highway. speed m/s; start_position (longitudinal, lateral) m."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -24,7 +24,7 @@ from chauffeur.worlds.highway.driver import HighwayDriver
 from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.perception import HighwayPerception
 from chauffeur.worlds.highway.roads import DT_S, HighwayScene, RoadConfig, build_scene, parse_config, road_graph
-from chauffeur.worlds.skeleton import finite
+from chauffeur.worlds.skeleton import WorldBase, finite, set_up
 
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
@@ -56,7 +56,7 @@ _starts: OrderedDict[tuple[str, int], _Start] = OrderedDict()
 """Start situations of this process: the commands of a benchmark sample share the costly part of a reset."""
 
 
-class HighwayWorld:
+class HighwayWorld(WorldBase[HighwayPerception, HighwayDriver]):
     """Ramp merge, multi-lane highway and intersection, stepped at 10 Hz."""
 
     engine = ENGINE
@@ -67,20 +67,14 @@ class HighwayWorld:
         turns=True,
         stop_signs=True,
     )
+    dt_s = DT_S
+    """Control period, s."""
 
     def __init__(self) -> None:
         self._start: _Start | None = None
         self._core: CoreRoad | None = None
-        self._perception: HighwayPerception | None = None
-        self._driver: HighwayDriver | None = None
         self._tick = 0
         self._clock_s = 0.0
-        self._seen: Observation | None = None
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
 
     @property
     def actuation(self) -> Actuation:
@@ -88,14 +82,10 @@ class HighwayWorld:
         return self._started().scene.actuation
 
     def _started(self) -> _Start:
-        if self._start is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._start
+        return set_up(self._start)
 
     def _road(self) -> CoreRoad:
-        self._started()
-        assert self._core is not None
-        return self._core
+        return set_up(self._core)
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Build road and traffic, let it warm up, and place the ego in the flow.
@@ -108,7 +98,7 @@ class HighwayWorld:
         self._core = start.core.copy()
         self._clock_s = start.clock_s
         self._tick = 0
-        self._seen = None
+        self._shown = None
         self._perception = HighwayPerception(self._core, start.scene.kind, start.scene.emergency_lanes)
         self._driver = None
         return self.observe()
@@ -118,7 +108,7 @@ class HighwayWorld:
         twin = HighwayWorld()
         twin._start = start = self._started()
         twin._core = core = self._road().copy()
-        twin._clock_s, twin._tick, twin._seen = self._clock_s, self._tick, self._seen
+        twin._clock_s, twin._tick, twin._shown = self._clock_s, self._tick, self._shown
         twin._perception = HighwayPerception(core, start.scene.kind, start.scene.emergency_lanes)
         if self._driver is not None:
             twin._driver = self._driver.copy(core, twin._perception)
@@ -138,26 +128,20 @@ class HighwayWorld:
             raise DataError("An observation ends too early.")
         tick, clock_s = _INSTANT.unpack_from(observation)
         self._road().adopt(observation[_INSTANT.size :])
-        self._tick, self._clock_s, self._seen = tick, clock_s, None
+        self._tick, self._clock_s, self._shown = tick, clock_s, None
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied: no more than a car can do."""
         finite(command)
         core = self._road()
-        self._seen = None
+        self._shown = None
         self._clock_s += DT_S
         acceleration = max(-GRIP_MPS2, min(GRIP_MPS2, command.acceleration_mps2))
         core.advance(acceleration, 0.0 - max(-LOCK_RAD, min(LOCK_RAD, command.steering_rad)))
         self._tick += 1
         return Command(float(core.out[at.OUT_ACCELERATION]), 0.0 - float(core.out[at.OUT_STEERING]))
 
-    def observe(self) -> Observation:
-        """The present instant as frozen values: taken when first asked for, the same until the world goes on."""
-        if self._seen is None:
-            self._seen = self._observed()
-        return self._seen
-
-    def _observed(self) -> Observation:
+    def _look(self) -> Observation:
         start, core, perception = self._started(), self._road(), self.perception()
         front, gap = int(core.out[at.OUT_FRONT]), float(core.out[at.OUT_GAP])
         lead = None if front < 0 else Lead(front, gap, float(core.floats[front, at.SPEED]))
@@ -186,12 +170,6 @@ class HighwayWorld:
         x, y = core.floats[EGO, at.X], core.floats[EGO, at.Y]
         min_x, max_x, min_y = scene.bounds
         return bool(x < min_x or x > max_x or y < min_y or self._clock_s >= scene.duration_s)
-
-    def perception(self) -> HighwayPerception:
-        """Questions about the present instant."""
-        if self._perception is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._perception
 
     def driver(self) -> HighwayDriver:
         """The low-level driver of the present trip; the same until the next reset."""

@@ -1,4 +1,4 @@
-"""Who moves in a lot besides the ego: a car on its way out, and people on foot. They mind the ego as people do."""
+"""Moving agents of a lot: a car on its way out, and people on foot. They mind the ego as people do."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class LeavingCar:
 
     @property
     def gone(self) -> bool:
-        """Whether it has left the lot."""
+        """True if it has left the lot."""
         return self.station_m > self.way.path.length_m - 1.5
 
     def state(self) -> VehicleState:
@@ -149,7 +149,7 @@ class LotWalker:
         return VehicleState(self.id, "obstacle", x, y, self._heading, speed, WALKER_M, WALKER_M, None, self.crashed)
 
     def decide(self, cars: Sequence[VehicleState], dt_s: float) -> None:
-        """Whether to walk in the next period."""
+        """Decide whether to walk in the next period."""
         if self.waits_s > 0.0:
             self.waits_s, self.walks = self.waits_s - dt_s, False
             return

@@ -1,4 +1,4 @@
-"""What a lot offers besides ground: kinds of bays, roofs, and the places people walk to."""
+"""Amenities of a lot: kinds of bays, roofs, and the places people walk to."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Ego:
 
 @dataclass(frozen=True, slots=True)
 class ParkingInstant:
-    """Who is where."""
+    """State of all moving agents."""
 
     tick: int
     ego: Ego

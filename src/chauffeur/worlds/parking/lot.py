@@ -81,7 +81,7 @@ class Lot:
     exit_m: tuple[float, float]
 
     def aisle_x_m(self, aisle: int) -> float:
-        """Where the middle of an aisle is; the first is 1."""
+        """x of an aisle's middle, m; the first aisle is 1."""
         return self.road[way_id(f"a{aisle}", f"b{aisle}")].centre.points_m[0][0]
 
 

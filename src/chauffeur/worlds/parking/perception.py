@@ -6,16 +6,17 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from chauffeur.concept import LaneId, Observation, VehicleState
+from chauffeur.concept import LaneId, Observation
 from chauffeur.control import LAMPILOT_EGO
 from chauffeur.control.idm import idm_acceleration
 from chauffeur.geometry import Polyline
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.over_graph import ObservedPerception
 from chauffeur.worlds.parking.lot import Lot
 
 
 class LaneMap:
-    """Which lane of a lot a place is in."""
+    """Maps places of a lot to lanes."""
 
     def __init__(self, lot: Lot) -> None:
         """Args: the lot."""
@@ -43,45 +44,23 @@ class LaneMap:
         return found
 
 
-class ParkingPerception:
+class ParkingPerception(ObservedPerception):
     """Perception of a lot; stays valid as it is stepped."""
 
     def __init__(self, lot: Lot, lanes: LaneMap, now: Callable[[], Observation]) -> None:
         """Args: the ground; its lanes; the present instant."""
+        super().__init__(now)
         self._lot = lot
         self._lanes = lanes
-        self._now = now
-
-    def vehicle(self, vehicle_id: int) -> VehicleState:
-        """State of somebody. Raises KeyError for an id that is not, or no longer, there."""
-        observation = self._now()
-        if vehicle_id == EGO:
-            return observation.ego
-        for other in observation.others:
-            if other.id == vehicle_id:
-                return other
-        raise KeyError(vehicle_id)
-
-    def has_lane(self, lane: LaneId) -> bool:
-        """Whether the lot has this lane; each spot is one."""
-        return lane in self._lot.road
 
     def lane_of(self, vehicle_id: int) -> LaneId:
         """Closest lane."""
         vehicle = self.vehicle(vehicle_id)
         return vehicle.lane or self._lanes.closest(vehicle.x_m, vehicle.y_m)
 
-    def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
-        """None: no lane of a lot has one beside it."""
-        del lane, offset
-
-    def speed_limit(self, lane: LaneId) -> float:
-        """Speed limit, m/s."""
-        return self._lot.road[lane].speed_limit_mps
-
     def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
         """Nearest ahead of and behind the ego in a lane."""
-        path, observation = self._lot.road[lane].centre, self._now()
+        path, observation = self._lot.road[lane].centre, self._observe()
         here = path.nearest(observation.ego.x_m, observation.ego.y_m)
         placed = [(path.nearest(o.x_m, o.y_m) - here, o.id) for o in observation.others if o.lane == lane]
         front = min((one for one in placed if one[0] > 0.0), default=None)
@@ -93,15 +72,6 @@ class ParkingPerception:
         one, two = self.vehicle(from_id), self.vehicle(to_id)
         path = self._lot.road[self.lane_of(from_id)].centre
         return path.nearest(two.x_m, two.y_m) - path.nearest(one.x_m, one.y_m)
-
-    def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:
-        """Nothing: there is no intersection."""
-        del from_left
-        return ()
-
-    def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
-        """None: there is no stop sign."""
-        del served
 
     def front_blocker(self, served: frozenset[int]) -> int | None:
         """Nearest ahead on the ego's own lane."""

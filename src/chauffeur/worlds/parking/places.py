@@ -1,4 +1,4 @@
-"""Which spot is meant: by its name, or as near as can be to the car, to the stadium, or to the exit."""
+"""Resolves the spot that is meant: by its name, or as near as can be to the car, to the stadium, or to the exit."""
 
 from __future__ import annotations
 

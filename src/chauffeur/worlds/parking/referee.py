@@ -26,16 +26,16 @@ class ParkingReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car has parked, wherever."""
+        """True if the car has parked, wherever."""
         return self._parked is not None
 
     @property
     def success(self) -> bool:
-        """Whether it has parked where it was meant to."""
+        """True if it has parked where it was meant to."""
         return self._parked == self._spot.name
 
     def metrics(self) -> tuple[Metric, ...]:
-        """How well it stands: from the middle of the spot, across and along it, and how straight; and the time."""
+        """Offsets from the middle of the spot across and along it, heading error, and time."""
         observation, box = self._world.observe(), self._spot.box
         along, across = box.place_of(observation.ego.x_m, observation.ego.y_m)
         turned = abs(wrap_to_pi(observation.ego.heading_rad - box.heading_rad))

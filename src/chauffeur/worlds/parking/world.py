@@ -39,7 +39,7 @@ from chauffeur.worlds.parking.perception import LaneMap, ParkingPerception
 from chauffeur.worlds.parking.places import parked_in, spot_for
 from chauffeur.worlds.parking.routes import Way, way_along, way_to_spot
 from chauffeur.worlds.path_follower import Chassis
-from chauffeur.worlds.skeleton import ShownWorld, config_of, finite
+from chauffeur.worlds.skeleton import WorldBase, config_of, finite, set_up
 
 DT_S: Final = 0.1
 CHASSIS: Final = Chassis(Body(4.89, 1.895, 1.395), 2.79, 0.6, 2.0)
@@ -127,7 +127,7 @@ class _Ego(Ego):
         self.rear, self.speed_mps, self.steering_rad = Pose(x, y, rear.heading_rad + turned), speed, steering
 
 
-class ParkingWorld(ShownWorld):
+class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
     """A parking lot, stepped at 10 Hz."""
 
     engine = "parking lot 1"
@@ -138,6 +138,12 @@ class ParkingWorld(ShownWorld):
         places=True,
         horizon_s=180.0,
     )
+    dt_s = DT_S
+    """Control period, s."""
+    chassis = CHASSIS
+    """The ego's size and axles."""
+    steering_rate = STEERING_RATE
+    """Steering rate of the ego, rad/s."""
 
     def __init__(self) -> None:
         self._scene: _Ground | None = None
@@ -146,29 +152,11 @@ class ParkingWorld(ShownWorld):
         self._walkers: list[LotWalker] = []
         self._hit: set[int] = set()
         self._tick = 0
-        self._shown: Observation | None = None
-        self._perception: ParkingPerception | None = None
-        self._driver: ParkingDriver | None = None
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def chassis(self) -> Chassis:
-        """The ego's size and axles."""
-        return CHASSIS
 
     @property
     def ground(self) -> Box:
-        """What is paved. Raises ScenarioError before the first reset."""
+        """The paved area. Raises ScenarioError before the first reset."""
         return self._started().lot.ground
-
-    @property
-    def steering_rate(self) -> float:
-        """How fast the ego's wheel turns, rad/s."""
-        return STEERING_RATE
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Paint the lot, park the cars and place the ego at the entrance.
@@ -253,18 +241,6 @@ class ParkingWorld(ShownWorld):
         self._shown = None
         return Command((ego.speed_mps - speed) / DT_S, wheel)
 
-    def perception(self) -> ParkingPerception:
-        """Questions about the present instant."""
-        self._started()
-        assert self._perception is not None
-        return self._perception
-
-    def driver(self) -> ParkingDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        self._started()
-        assert self._driver is not None
-        return self._driver
-
     def spot(self, place: str) -> Spot:
         """The free spot that is meant by a place. Raises ScenarioError, saying why there is none."""
         scene = self._started()
@@ -284,9 +260,7 @@ class ParkingWorld(ShownWorld):
         return None if found is None else found.name
 
     def _started(self) -> _Ground:
-        if self._scene is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._scene
+        return set_up(self._scene)
 
     def _way_to_lane(self, lane: LaneId | None) -> Way:
         scene, box = self._started(), self._ego.box
@@ -343,7 +317,7 @@ class ParkingWorld(ShownWorld):
 
 
 def _taken(config: LotConfig, rng: np.random.Generator, scenario: str) -> frozenset[str]:
-    """Which spots somebody stands in: a fixed share of all, none of those that are to be free."""
+    """Draw the occupied spots: a fixed share of all, none of those that are to be free."""
     names = sorted(build_lot(config.aisles, config.spots_a_row).spots)
     unknown = [name for name in config.free if name not in names]
     if unknown:

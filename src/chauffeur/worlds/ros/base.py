@@ -1,4 +1,4 @@
-"""What every vehicle interface offers: parameters in, what was published out. It knows nothing of language.
+"""The contract of vehicle interfaces: parameters in, published messages out. It knows nothing of language.
 
 A vehicle interface is no `World`: a real vehicle is not stepped, and nothing here actuates. It asks the vehicle's own
 planner for a speed cap and a look-ahead; the vehicle's planner, its obstacle stops and its driver keep the last word.
@@ -51,7 +51,7 @@ Asked: TypeAlias = tuple[tuple[TopicMessage, ...], str]
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """What `apply` handed to the vehicle.
+    """Messages that `apply` handed to the vehicle.
 
     Attributes:
         number: 1 for the first of this interface, 2 for the next, ...
@@ -71,7 +71,7 @@ Link = Literal["dry-run", "connecting", "waiting", "up", "refused", "closed"]
 
 @dataclass(frozen=True, slots=True)
 class RosVehicleState:
-    """What is known of the vehicle and of the way to it, at the moment of asking.
+    """State of the vehicle and of the link to it, at the time of asking.
 
     Attributes:
         link: How the way to the vehicle is.

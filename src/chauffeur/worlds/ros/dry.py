@@ -28,7 +28,7 @@ class DryRun:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What would have been published, oldest first."""
+        """Messages that would have been published, as command lines, oldest first."""
         with self._lock:
             return tuple(self._lines)
 

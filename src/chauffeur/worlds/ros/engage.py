@@ -97,7 +97,7 @@ def _tell(settings: RosbridgeSettings, engaged: bool, within_s: float) -> int:
 
 
 def _listeners(bridge: ClientConnection, end_s: float) -> int:
-    """How many nodes subscribe to the topic, as `rosapi` says."""
+    """Number of nodes that subscribe to the topic, by `rosapi`."""
     asked = {"op": "call_service", "id": "who", "service": "/rosapi/subscribers", "args": {"topic": ENGAGE_TOPIC}}
     bridge.send(json.dumps(asked))
     while True:

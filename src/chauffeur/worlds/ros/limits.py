@@ -19,7 +19,7 @@ ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class VehicleLimits:
-    """What may be published to one vehicle, from the vehicle's configuration file.
+    """Limits on what is published to one vehicle, from its configuration file.
 
     Attributes:
         max_speed_mps: Highest target speed.

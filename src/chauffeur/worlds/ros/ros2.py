@@ -30,7 +30,7 @@ RETRY_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Ros2Settings:
-    """Where a ROS 2 vehicle is.
+    """Address of a ROS 2 vehicle.
 
     Attributes:
         domain: `ROS_DOMAIN_ID`.
@@ -176,7 +176,7 @@ class Ros2Vehicle(ThreadedVehicle):
                     del self._pending[message.topic]
 
     def _look(self, writers: dict[str, Any]) -> None:
-        """Who reads what we write, and who would but asks for another quality."""
+        """Count matched and QoS-incompatible subscribers."""
         receivers = min(len(writer.get_matched_subscriptions()) for writer in writers.values())
         misfits = sum(writer.get_offered_incompatible_qos_status().total_count for writer in writers.values())
         with self._lock:

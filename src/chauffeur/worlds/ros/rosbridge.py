@@ -44,7 +44,7 @@ LARGEST: Final = 64 * 1024
 
 @dataclass(frozen=True, slots=True)
 class RosbridgeSettings:
-    """Where the server is.
+    """Address of the rosbridge server.
 
     Attributes:
         url: `ws://host:port` or `wss://host:port`. rosbridge asks for no password: whoever reaches it commands the

@@ -1,4 +1,4 @@
-"""What the different ways to a vehicle share: a driving stack's own messages for a wish, numbered and remembered."""
+"""Shared by all vehicle interfaces: a driving stack's own messages for a wish, numbered and remembered."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Stack(Protocol):
 
     @property
     def limits(self) -> VehicleLimits:
-        """What may be published to the vehicle."""
+        """Limits on what is published to the vehicle."""
         ...
 
     def wished(self, wish: CheckedWish) -> Asked:
@@ -50,7 +50,7 @@ class StackSetpoints:
 
     @property
     def number(self) -> int:
-        """How many times something was published."""
+        """Number of publications."""
         with self._lock:
             return self._number
 

@@ -1,4 +1,4 @@
-"""What the vehicle interfaces with a thread of their own share. Who applies a wish leaves it there and never waits."""
+"""Base of vehicle interfaces with a thread of their own. Callers hand over a wish and never wait."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class ThreadedVehicle(ABC):
 
     @abstractmethod
     def _run(self) -> None:
-        """What the thread does until `_ending` is set; `_woken` says that there is something to do."""
+        """Body of the thread until `_ending` is set; `_woken` signals work."""
 
     def _leave(self, left: Iterable[tuple[str, _T]], *places: dict[str, _T]) -> None:
         """Leave the newest of each topic for the thread, in place of what waits there; what comes last goes last."""

@@ -31,5 +31,5 @@ class Trails:
         return heading
 
     def seen(self) -> None:
-        """That was everybody of this period: the others are forgotten."""
+        """End the period: forget agents that were not seen in it."""
         self._axles, self._now = self._now, {}

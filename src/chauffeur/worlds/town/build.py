@@ -45,7 +45,7 @@ _LOOK_BACK, _LOOK_BACK_M = 8, 40.0
 
 @dataclass(frozen=True)
 class MapSources:
-    """What a pack is built from.
+    """Sources of a map pack.
 
     Attributes:
         xodr: OpenDRIVE file.

@@ -1,4 +1,4 @@
-"""What colour each vehicle and person of a town has: drawn from the trip's seed and their own number, and from nothing
+"""Colours of a town's vehicles and people: drawn from the trip's seed and their own number, and from nothing
 else, so that colours change no other draw of a trip."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a town's driver has to tell of itself so that another process answers and decides as it does."""
+"""State of a town's driver, so that a copy in another process answers and decides alike."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from chauffeur.worlds.town.foresight import Meeting
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Where a driver is going, and what it minds.
+    """Route and state of a driver.
 
     Attributes:
         route: Where to.

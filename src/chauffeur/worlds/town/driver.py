@@ -140,7 +140,7 @@ class TownDriver:
 
     @property
     def course(self) -> Course:
-        """What another process has to know of it."""
+        """State that a copy in another process needs."""
         stretch, led = self._stretch, self._stretch.led
         return Course(
             route=self._corridor.route,
@@ -178,7 +178,7 @@ class TownDriver:
 
     @property
     def route(self) -> Route:
-        """Where it is going."""
+        """The present route."""
         return self._corridor.route
 
     @property
@@ -188,7 +188,7 @@ class TownDriver:
 
     @property
     def station_m(self) -> float:
-        """How far along that line the rear axle is."""
+        """Station of the rear axle along that line, m."""
         return self._station
 
     def lanes_here(self) -> tuple[LaneId, ...]:
@@ -210,18 +210,18 @@ class TownDriver:
 
     @property
     def has_goal(self) -> bool:
-        """Whether its route leads somewhere, and is not just the way on."""
+        """True if its route leads somewhere, and is not just the way on."""
         return self._goal
 
     @property
     def _ahead(self) -> Meeting | None:
-        """Who is ahead on the line, people left out."""
+        """The nearest agent ahead on the line, people left out."""
         now = [one for one in self._meetings if one.now and one.other.kind != "pedestrian"]
         return min(now, key=lambda one: one.first_m, default=None)
 
     @property
     def lead(self) -> Lead | None:
-        """Who is ahead on the line, from centre to centre."""
+        """The lead vehicle on the line, centre to centre."""
         nearest = self._ahead
         if nearest is None:
             return None
@@ -523,7 +523,7 @@ class TownDriver:
     # Stops ------------------------------------------------------------------------------------------------------------
 
     def _stops(self, seen: Observation, nose: float) -> list[StopPoint]:
-        """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
+        """Stop points for the end of the line, lights, signs, and a blocked junction."""
         stretch = self._stretch
         stops = [StopPoint(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
@@ -542,7 +542,7 @@ class TownDriver:
         return stops
 
     def _wait_line(self, i: int) -> float:
-        """Where to wait before a junction: at its stop line, else at its edge."""
+        """Waiting point before a junction: its stop line, else its edge."""
         start, _ = self._stretch.span(i)
         return start - 0.5
 
@@ -583,7 +583,7 @@ class TownDriver:
         return self._foresight.meetings(seen, around, line, float(low), half + wider[low:high])
 
     def _yields(self, meeting: Meeting, nose: float, speed: float, target: float) -> StopPoint | None:
-        """Where to stop for somebody whose way crosses, unless one is through before the other comes."""
+        """Stop point for an agent whose way crosses, unless one is through before the other comes."""
         person = meeting.other.kind == "pedestrian"
         before = _BEFORE_PERSON_M if person else _BEFORE_M
         at = meeting.first_m - before
@@ -607,7 +607,7 @@ class TownDriver:
         return StopPoint(line, f"letting {meeting.other.kind} {meeting.other.id} go first")
 
     def _waiting(self, nose: float, at: float) -> float:
-        """Where to wait: before the junction where there would be no room behind its line."""
+        """Waiting point: before the junction where there would be no room behind its line."""
         stretch = self._stretch
         i, lane = stretch.lane_at(max(at, 0.0))
         if not lane.junction:

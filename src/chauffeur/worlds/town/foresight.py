@@ -1,4 +1,4 @@
-"""Where the others of a town may be in the next seconds, and where that is on the ego's line.
+"""Predicts other agents of a town over the next seconds, and where they meet the ego's line.
 
 Everybody on a lane is taken to follow it, and each lane that it leads into, as fast as now or braking on as now; who is
 ruled by a red light and can still stop, stops at its line. Everybody else goes straight on.
@@ -49,7 +49,7 @@ _ON_FOOT_MPS: Final = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Where and when somebody is on the ego's line, at the soonest and at the latest.
+    """An agent's presence on the ego's line: where, and when at the soonest and at the latest.
 
     Attributes:
         other: Who.
@@ -122,7 +122,7 @@ class Foresight:
         start_m: float,
         half_width_m: Array,
     ) -> list[Meeting]:
-        """Who is, or may come to be, on a line.
+        """Agents that are, or may come to be, on a line.
 
         Args:
             seen: The instant.

@@ -28,7 +28,7 @@ class GapAcceptance:
         self._into: dict[LaneId, tuple[Polyline, ...]] = {}
 
     def accepts(self, seen: Observation, goal: Stretch) -> bool:
-        """Whether there is room in another lane, ahead and behind."""
+        """True if there is room in another lane, ahead and behind."""
         ego = seen.ego
         here = goal.line.nearest(ego.x_m, ego.y_m, 0.0, first_m(goal))
         reach = NEAR_M + COMING_S * max([0.0, *(one.speed_mps - ego.speed_mps for one in seen.others)])
@@ -58,7 +58,7 @@ class GapAcceptance:
         return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
 
     def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
-        """Whether somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
+        """True if somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
 
         Args:
             other: Who.

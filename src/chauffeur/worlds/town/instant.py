@@ -18,7 +18,7 @@ MOST_BYTES: Final = 60_000
 
 @dataclass(frozen=True, slots=True)
 class TownInstant:
-    """What changes in a town from instant to instant.
+    """The part of a town's state that changes from instant to instant.
 
     Attributes:
         tick: Control periods since the trip began.

@@ -35,7 +35,7 @@ class Levels:
         self._crossings = np.array(sorted(_over_one_another(town)), dtype=np.float64).reshape(-1, 2)
 
     def near(self, x_m: float, y_m: float) -> bool:
-        """Whether roads lie over one another within sight."""
+        """True if roads lie over one another within sight."""
         x, y, lasts_m, found = self._seen_from
         if math.hypot(x - x_m, y - y_m) >= lasts_m:
             away = np.hypot(self._crossings[:, 0] - x_m, self._crossings[:, 1] - y_m)
@@ -45,13 +45,13 @@ class Levels:
         return found
 
     def all_level(self, lane: LaneId, station_m: float, other: LaneId) -> bool:
-        """Whether no place of another lane is on another level than one of a lane, however near."""
+        """True if no place of another lane is on another level than one of a lane, however near."""
         low, high = self._span(other)
         here = self._height_m(lane, station_m)
         return here - low <= APART_M and high - here <= APART_M
 
     def apart(self, lane: LaneId, station_m: float, other: LaneId, other_station_m: float, away_m: float) -> bool:
-        """Whether two places so far from each other in the plane are on different levels."""
+        """True if two places so far from each other in the plane are on different levels."""
         rise = abs(self._height_m(lane, station_m) - self._height_m(other, other_station_m))
         return rise > APART_M + STEEPEST * away_m
 

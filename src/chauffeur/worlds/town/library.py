@@ -28,7 +28,7 @@ def load(name_or_path: str | Path) -> MapPack:
 
 
 def has_pack(folder: Path) -> bool:
-    """Whether a folder holds a map pack."""
+    """True if a folder holds a map pack."""
     return any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz"))
 
 

@@ -232,7 +232,7 @@ def _furnish(xodr: Any, plan: TownPlan, street: TownStreet, road: Xodr.Road, len
 
 
 def _minor(plan: TownPlan, street: TownStreet, node: int) -> bool:
-    """Whether a street gives way at a crossroads: to a ring it joins, a wider street, one that goes through."""
+    """True if a street gives way at a crossroads: to a ring it joins, a wider street, one that goes through."""
     others = [one for one in plan.streets if node in (one.a, one.b) and one is not street]
     if len(others) < 2:
         return False

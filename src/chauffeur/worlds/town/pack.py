@@ -88,7 +88,7 @@ class SignalGroup:
         return 0, self.phases[0].seconds
 
     def signals(self, time_s: float) -> tuple[Signal, ...]:
-        """What its heads show at a time, and how long they still do."""
+        """States of its heads at a time, and how long they last."""
         now, left = self.phase_at(time_s)
         states, after = self.phases[now].states, self._after[now]
         return tuple(
@@ -115,7 +115,7 @@ class SignalGroup:
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """Where people cross.
+    """A pedestrian crossing.
 
     Attributes:
         id: Stable.
@@ -240,7 +240,7 @@ class MapPack:
 
     @cached_property
     def levels(self) -> Levels:
-        """Which of its roads lie over one another. Raises OpenDriveError, OSError."""
+        """Roads that lie over one another. Raises OpenDriveError, OSError."""
         return Levels(self.opendrive)
 
     @cached_property
@@ -254,7 +254,7 @@ class MapPack:
 
 
 def maps_folder() -> Path:
-    """Where built packs lie: `maps` in the user's data folder."""
+    """Folder of built packs: `maps` in the user's data folder."""
     return data_home() / "maps"
 
 
@@ -363,7 +363,7 @@ def _rounded(content: Any) -> Any:
 
 
 def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
-    """Which files a pack consists of, and when they were written."""
+    """Files of a pack with their modification times."""
     files = [(path.name, path.stat()) for path in folder.iterdir()]
     return tuple(sorted((name, found.st_size, found.st_mtime_ns) for name, found in files))
 

@@ -122,11 +122,11 @@ class People:
         return Pose(x, y, heading)
 
     def crosses(self, walker: Walker) -> bool:
-        """Whether somebody is on the carriageway."""
+        """True if somebody is on the carriageway."""
         return self._walks[walker.walk].crossing is not None and walker.at_m > 0.0 and walker.over is None
 
     def _in_the_way(self, walker: Walker, vehicles: Sequence[VehicleState]) -> bool:
-        """Whether a vehicle that stands has the next step: nobody walks into the side of a car."""
+        """True if a vehicle that stands has the next step: nobody walks into the side of a car."""
         one = self.state(walker)
         step = Pose(one.x_m, one.y_m, one.heading_rad).ahead(_STEP_M)
         body = Box(step.x_m, step.y_m, step.heading_rad, _STEP_M, WIDE_M)
@@ -157,7 +157,7 @@ class People:
         lights: Mapping[str, SignalState],
         vehicles: Sequence[VehicleState],
     ) -> bool:
-        """Whether the light of those who drive over the crossing is red, and nobody comes who could not stop."""
+        """True if the light of those who drive over the crossing is red, and nobody comes who could not stop."""
         if any(lights.get(lane, "red") in ("green", "yellow") for lane in self._lanes[crossing.id]):
             return False
         line = self._walks[walker.walk].line

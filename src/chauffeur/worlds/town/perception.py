@@ -10,6 +10,7 @@ from chauffeur.concept import LaneId, Observation, SignalState, Turn, VehicleSta
 from chauffeur.control.idm import IdmParameters, idm_acceleration
 from chauffeur.geometry import JunctionWay, Lane, RoadGraph, choice_ahead
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.over_graph import ObservedPerception
 from chauffeur.worlds.town.driver import TOWN_IDM, TownDriver
 from chauffeur.worlds.town.pack import Place, places_called
 
@@ -23,7 +24,7 @@ _CHANGE_M: Final = 15.0
 """Room that a change of lanes needs at least."""
 
 
-class TownPerception:
+class TownPerception(ObservedPerception):
     """Perception of the present instant of a town; stays valid as it is stepped."""
 
     def __init__(
@@ -33,24 +34,19 @@ class TownPerception:
         driver: TownDriver,
         places: Sequence[Place] = (),
     ) -> None:
-        self._road, self._look, self._driver, self._places = road, look, driver, places
+        super().__init__(look)
+        self._graph, self._look, self._driver, self._places = road, look, driver, places
         self.look = look
         self._choices: dict[
             tuple[LaneId, ...], tuple[LaneId, float, Mapping[Turn, tuple[JunctionWay, ...]]] | None
         ] = {}
 
-    def vehicle(self, vehicle_id: int) -> VehicleState:
-        """State of a vehicle or object. Raises KeyError for an id that nobody around has."""
-        seen = self._look()
-        if vehicle_id == EGO:
-            return seen.ego
-        for one in (*seen.others, *seen.objects):
-            if one.id == vehicle_id:
-                return one
-        raise KeyError(vehicle_id)
+    @property
+    def _road(self) -> RoadGraph:
+        return self._graph
 
     def has_lane(self, lane: LaneId) -> bool:
-        """Whether the town has this lane, for cars."""
+        """True if the town has this lane, for cars."""
         found = self._road.get(lane)
         return found is not None and found.kind == "driving"
 
@@ -68,10 +64,6 @@ class TownPerception:
         """Lane `offset` places to the right (negative: left); None beyond the edge."""
         beside = None if offset == 0 else self._road.neighbour(lane, offset)
         return beside if beside is not None and self._road[beside].kind == self._road[lane].kind else None
-
-    def speed_limit(self, lane: LaneId) -> float:
-        """Speed limit, m/s."""
-        return self._road[lane].speed_limit_mps
 
     def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
         """Nearest vehicle ahead of and behind the ego in a lane, or in what follows and precedes it."""
@@ -211,7 +203,7 @@ class TownPerception:
         return lane if self._road[lane].kind == "driving" else None
 
     def is_clear(self) -> bool:
-        """Whether no road user that crosses the way is being let go first."""
+        """True if no road user that crosses the way is being let go first."""
         return not self._driver.lets_go_first
 
     def junction_ahead(self) -> tuple[float, tuple[Turn, ...]] | None:
@@ -261,7 +253,7 @@ class TownPerception:
         return next((lane for lane in stretch.lanes[at:] if lane.junction), None)
 
     def _along(self, lane: LaneId, other: VehicleState) -> float | None:
-        """How far ahead of the ego somebody is in a lane, the one before or the one after it; None if in none."""
+        """Distance from the ego to an agent in a lane, the one before or the one after it; None if in none."""
         own, ego = self._road[lane], self._look().ego
         if other.lane is None:
             return None

@@ -16,7 +16,7 @@ Control = Literal["lights", "stop", "yield", "none"]
 
 @dataclass(frozen=True, slots=True)
 class Crossroads:
-    """Where streets meet. `radius_m` is kept free of streets; `control` is what rules the minor ones (lights: all)."""
+    """A junction of streets. `radius_m` is kept free of streets; `control` rules the minor ones (lights: all)."""
 
     x_m: float
     y_m: float

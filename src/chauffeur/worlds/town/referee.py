@@ -23,16 +23,16 @@ class TownReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car is there."""
+        """True if the car is there."""
         return self._arrived
 
     @property
     def success(self) -> bool:
-        """Whether the car is there."""
+        """True if the car is there."""
         return self._arrived
 
     def metrics(self) -> tuple[Metric, ...]:
-        """Whether it arrived, how far it drove, and how long that took."""
+        """Arrival, distance driven, and time taken."""
         return (
             Metric("town-arrived-v1", float(self._arrived), "points"),
             Metric("town-driven-v1", self._driven_m, "m"),

@@ -1,4 +1,4 @@
-"""What an OpenDRIVE file itself says of lights, signs, crossings and landmarks, laid onto the lanes."""
+"""Lights, signs, crossings and landmarks of an OpenDRIVE file, laid onto the lanes."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def _beside(road: RoadGraph, x_m: float, y_m: float, heading_rad: float) -> tupl
 
 
 def _line_for(town: OpenDriveMap, signal: RoadSignal, lanes: Sequence[LaneId]) -> tuple[Line, Point, float, float]:
-    """Where to stop for a sign: across its lanes where it stands."""
+    """Stop line of a sign: across its lanes where it stands."""
     poses = []
     for lane in lanes:
         centre = town.road[lane].centre

@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.places import Destination
-from chauffeur.worlds.skeleton import ShownWorld
+from chauffeur.worlds.skeleton import WorldBase, set_up
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant
 from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
@@ -32,22 +32,24 @@ _LEFT_M: Final = 8.0
 """A place has been left when the car is so far from where it stood."""
 
 
-class TownScene(ShownWorld):
+class TownScene(WorldBase[TownPerception, TownDriver]):
     """Road, lights, driver and perception of a trip. Who and what is where, its heirs say."""
 
     capabilities = TOWN_CAPABILITIES
+    dt_s = DT_S
+    """Control period, s."""
+    car = LINCOLN_MKZ
+    """The ego."""
 
     def __init__(self, town: MapPack | None = None) -> None:
         """Args: the town to drive in, whatever scenarios say; by default they do."""
         self._given = town
         self._town: MapPack | None = None
         self._config: TownConfig | None = None
-        self._driver: TownDriver | None = None
         self._route: Route | None = None
         self._lane: LaneId | None = None
         self._ego_station = 0.0
         self._tick = 0
-        self._shown: Observation | None = None
         self._others: tuple[VehicleState, ...] = ()
         self._forced: dict[str, SignalState] = {}
         self._place = ""
@@ -63,37 +65,14 @@ class TownScene(ShownWorld):
         return engine_name()
 
     @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def car(self) -> KinematicBicycle:
-        """The ego."""
-        return LINCOLN_MKZ
-
-    @property
     def chassis(self) -> Chassis:
         """The ego's size, axles and bounds."""
         return Chassis.of(self.car)
 
     @property
     def town(self) -> MapPack:
-        """Where it is driven. Raises ScenarioError before the first reset."""
-        if self._town is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._town
-
-    def perception(self) -> TownPerception:
-        """Questions about the present instant."""
-        assert self.town is not None
-        return self._perception
-
-    def driver(self) -> TownDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        assert self.town is not None
-        assert self._driver is not None
-        return self._driver
+        """Map pack of the trip. Raises ScenarioError before the first reset."""
+        return set_up(self._town)
 
     # Places -----------------------------------------------------------------------------------------------------------
 
@@ -115,7 +94,7 @@ class TownScene(ShownWorld):
         return None if self._stood is None else self._stood[0]
 
     def destination(self) -> Destination | None:
-        """Where the car is going; None where it goes nowhere, or is there."""
+        """Destination of the ego; None without one, or once it is reached."""
         driver, road = self._driver, self.town.road
         if driver is None or not driver.has_goal or self._stood is not None:
             return None
@@ -129,12 +108,12 @@ class TownScene(ShownWorld):
 
     @property
     def arrived(self) -> bool:
-        """Whether the ego has come to a stand at its goal."""
+        """True if the ego has come to a stand at its goal."""
         return self._stood is not None or (self._still_s >= STANDS_S and self._at_goal)
 
     @property
     def _at_goal(self) -> bool:
-        """Whether the ego is at the end of its way to a goal, moving or not."""
+        """True if the ego is at the end of its way to a goal, moving or not."""
         driver = self._driver
         if driver is None or self._route is None or not driver.has_goal or not driver.stretch.goal:
             return False
@@ -177,7 +156,7 @@ class TownScene(ShownWorld):
 
     @property
     def _heads_elsewhere(self) -> bool:
-        """Whether somebody wished for another place than the scenario's goal."""
+        """True if somebody wished for another place than the scenario's goal."""
         return bool(self._place) or self._stood is not None
 
     # Looking ----------------------------------------------------------------------------------------------------------
@@ -226,7 +205,7 @@ class TownScene(ShownWorld):
 
     @property
     def _over(self) -> bool:
-        """Whether nothing will move any more."""
+        """True if nothing will move any more."""
         raise NotImplementedError
 
     def _look(self) -> Observation:

@@ -57,12 +57,12 @@ class StagedActor(BaseModel):
 
     @property
     def at_once(self) -> bool:
-        """Whether it moves from the beginning."""
+        """True if it moves from the beginning."""
         return self.after_s <= 0.0 and math.isinf(self.near_m)
 
     @property
     def agent_kind(self) -> AgentKind:
-        """What observations call it: a van is a large car."""
+        """Kind in observations: a van is a large car."""
         return "car" if self.kind == "van" else self.kind
 
 
@@ -111,7 +111,7 @@ class Staged:
         return self._lines[way]
 
     def pose_of(self, actor: StagedActor) -> Pose:
-        """Where one begins."""
+        """Start pose of an actor."""
         line, zero = self._line(actor.way)
         at = line.at(min(max(0.0, zero + actor.ahead_m), line.length_m))
         x, y = at.place(0.0, actor.left_m)

@@ -36,7 +36,7 @@ FIRST_SIGN: Final = 30_001
 
 @dataclass(frozen=True, slots=True)
 class StopPoint:
-    """Where the front bumper has to stop, station of the stretch, and why."""
+    """A place where the front bumper has to stop (station of the stretch), and why."""
 
     at_m: float
     why: str
@@ -65,7 +65,7 @@ class StopLineRules:
     def stops(
         self, seen: Observation, stretch: Stretch, station: float, nose: float, meetings: Sequence[Meeting]
     ) -> list[StopPoint]:
-        """Where to stop for lights and signs.
+        """Stop points for lights and signs.
 
         Args:
             seen: The instant.
@@ -121,7 +121,7 @@ class StopLineRules:
         return stop
 
     def line_m(self, stretch: Stretch, what: Signal | Sign, start: float, end: float) -> float:
-        """Where a stop line is on the stretch: at the end of the lane where nobody says."""
+        """Station of a stop line on the stretch; the end of the lane where none is given."""
         if what.stop_line_m is None:
             return end
         known = self._lines.get((what.id, start))
@@ -155,7 +155,7 @@ class StopLineRules:
         return [StopPoint(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
 
     def _no_room_behind(self, line: float, nose: float, speed: float, meetings: Sequence[Meeting]) -> bool:
-        """Whether who is ahead would leave no room for all of the car behind a line that it can still stop at.
+        """True if who is ahead would leave no room for all of the car behind a line that it can still stop at.
 
         Who stands on a line when its light turns red has run it.
         """
@@ -165,7 +165,7 @@ class StopLineRules:
         return self._crowded(line, meetings)
 
     def _crowded(self, line: float, meetings: Sequence[Meeting]) -> bool:
-        """Whether who is ahead leaves no room for all of the car behind a line, should they stop."""
+        """True if who is ahead leaves no room for all of the car behind a line, should they stop."""
         needed = line + self._length_m + _ROOM_BEHIND_M
         return any(
             one.now and one.along and line - 0.5 < one.first_m < needed - max(0.0, one.along_mps) ** 2 / _TO_A_STAND
@@ -175,7 +175,7 @@ class StopLineRules:
     def _waits_astride(
         self, light: Signal, line: float, nose: float, speed: float, meetings: Sequence[Meeting]
     ) -> bool:
-        """Whether a car whose front is over a line waits there with its tail before it: it came to a stand in a queue,
+        """True if a car whose front is over a line waits there with its tail before it: it came to a stand in a queue,
         and its light has turned red since, or there is no room behind the line yet."""
         room = line + astride_m(self._length_m) - nose
         if nose < line or light.state == "off" or speed * speed > 2.0 * _YELLOW_MPS2 * max(0.0, room):
@@ -184,7 +184,7 @@ class StopLineRules:
         return light.state == "red" or turns or self._crowded(line, meetings)
 
     def _serves(self, sign: Sign, line: float, nose: float, speed: float) -> bool:
-        """Whether a stop sign is served, or has been passed."""
+        """True if a stop sign is served, or has been passed."""
         if nose > line + _AT_SIGN_M:
             self._served |= {sign.id}
             return True

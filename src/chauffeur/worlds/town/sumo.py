@@ -21,7 +21,7 @@ EGO_NAME: Final = "ego"
 
 
 class Make(NamedTuple):
-    """What vehicles of a kind are like: size, bounds, and their share of the traffic."""
+    """Properties of a kind of vehicle: size, bounds, and share of the traffic."""
 
     kind: AgentKind
     length_m: float
@@ -137,7 +137,7 @@ class Sumo:
 
     @property
     def open(self) -> bool:
-        """Whether this process still runs it."""
+        """True if this process still runs it."""
         return self in _holder
 
     def close(self) -> None:
@@ -218,7 +218,7 @@ class Sumo:
         return way[max(0, vehicle.getRouteIndex(name)) :]
 
     def driven_m(self, name: str) -> float:
-        """How far somebody has come since it set out; 0 for one who has not."""
+        """Distance a vehicle has driven since it set out, m; 0 before that."""
         try:
             return max(0.0, float(self._sumo.vehicle.getDistance(name)))
         except self._sumo.libsumo.TraCIException:
@@ -229,7 +229,7 @@ class Sumo:
         return frozenset(self._kind_of)
 
     def gone(self) -> tuple[str, ...]:
-        """Who has arrived or was stuck too long in the period that has passed."""
+        """Vehicles that arrived or were stuck too long in the past period."""
         simulation = self._sumo.simulation
         stuck = [name for name in simulation.getStartingTeleportIDList() if name in self._kind_of]
         for name in stuck:
@@ -351,7 +351,7 @@ class Sumo:
     # Lights -----------------------------------------------------------------------------------------------------------
 
     def links(self) -> tuple[Link, ...]:
-        """What its lights rule."""
+        """Links that its traffic lights rule."""
         lights, lanes = self._sumo.trafficlight, self._sumo.lane
         found: list[Link] = []
         for light in lights.getIDList():

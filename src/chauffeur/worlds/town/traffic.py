@@ -1,4 +1,4 @@
-"""Who else drives in a town: so many vehicles of all kinds, each on a way of its own that never ends."""
+"""Traffic of a town: vehicles of all kinds, each on an endless route of its own."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Traffic:
                 self._sumo.go_on(name, [*route[:-1], *self._way(route[-1])])
 
     def _stuck(self, name: str) -> bool:
-        """Whether somebody has got nowhere for longer than any red light lasts."""
+        """True if somebody has got nowhere for longer than any red light lasts."""
         driven = self._sumo.driven_m(name)
         since, before = self._moved.get(name, (self._tick, driven))
         if driven - before > _NOWHERE_M:

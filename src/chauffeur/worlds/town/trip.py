@@ -1,4 +1,4 @@
-"""Where a trip through a town begins and where it leads: from a scenario's words and numbers to lanes."""
+"""Start and goal of a trip through a town: from a scenario's words and numbers to lanes."""
 
 from __future__ import annotations
 

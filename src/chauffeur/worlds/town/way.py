@@ -193,7 +193,7 @@ class Stretch:
         )
 
     def swept(self, overhang_m: float) -> tuple[Array, Array, Array]:
-        """What a car takes of the road whose rear axle follows the line: (x, y) of the middle, and how much wider.
+        """Swept path of a car whose rear axle follows the line: (x, y) of its middle, and the extra half width.
 
         In a bend of radius R its front corner swings out by d * d / (2 R), d ahead of the rear axle.
 
@@ -223,18 +223,18 @@ class Stretch:
         return at, self.lanes[at]
 
     def span(self, at: int) -> tuple[float, float]:
-        """Where one of its lanes begins and ends."""
+        """Stations where one of its lanes begins and ends, m."""
         end = self.starts_m[at + 1] if at + 1 < len(self.lanes) else self.line.length_m
         return self.starts_m[at], end
 
 
 def first_m(stretch: Stretch) -> float:
-    """Where the first lane of a stretch ends."""
+    """Station where the first lane of a stretch ends, m."""
     return stretch.span(0)[1]
 
 
 def astride_m(length_m: float) -> float:
-    """How far beyond a stop line the front bumper of a car may wait: its tail is not over the line yet.
+    """Distance beyond a stop line at which a front bumper may wait with the tail not over the line yet, m.
 
     Who has its tail over the line while the light is red has run it, whether it drives or stands.
     """

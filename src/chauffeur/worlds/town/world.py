@@ -48,7 +48,7 @@ _AMID_M: Final = 0.5
 
 @dataclass(slots=True)
 class _Actor:
-    """What a scenario put on the road."""
+    """A road user or thing that a scenario put on the road."""
 
     id: int
     kind: AgentKind
@@ -161,7 +161,7 @@ class TownWorld(TownScene):
 
     @property
     def vehicles(self) -> int:
-        """How many vehicles the traffic has."""
+        """Number of vehicles in traffic."""
         return self._traffic.count
 
     # The stage of a scenario ------------------------------------------------------------------------------------------
@@ -368,7 +368,7 @@ class TownWorld(TownScene):
         return (self._ego(), *(one for one in self._others if one.kind != "pedestrian"))
 
     def _look_round(self) -> None:
-        """Who is around, and whom the ego touches."""
+        """Update the agents around, and contacts with the ego."""
         assert self._sumo is not None
         self._shown = None
         middle = self._state.middle(LINCOLN_MKZ)
@@ -421,7 +421,7 @@ class TownWorld(TownScene):
         return self._colours[number]
 
     def _on_another_level(self, lane: LaneId | None, x_m: float, y_m: float, ego: Pose) -> bool:
-        """Whether somebody in a lane is over the ego, or under it."""
+        """True if somebody in a lane is over the ego, or under it."""
         if lane is None or self._lane is None:
             return False
         if self.town.levels.all_level(self._lane, self._ego_station, lane):
@@ -442,7 +442,7 @@ class TownWorld(TownScene):
         return known[1]
 
     def _amid(self, name: LaneId, x_m: float, y_m: float) -> bool:
-        """Whether a place is well inside a lane: of those that follow one another no other is closer."""
+        """True if a place is well inside a lane: of those that follow one another no other is closer."""
         lane = self.town.road[name]
         station, offset = lane.centre.project(x_m, y_m)
         return _AMID_M < station < lane.length_m - _AMID_M and abs(offset) < lane.width_m / 2.0
@@ -493,7 +493,7 @@ class TownWorld(TownScene):
 
 
 def _ruled(town: MapPack, links: tuple[Link, ...]) -> dict[str, str]:
-    """Which head rules each SUMO lane before a light."""
+    """Signal head that rules each SUMO lane before a light."""
     assert town.sumo is not None
     of_link = {(light, index): head for head, (light, indices) in town.sumo.links.items() for index in indices}
     return {link.lane: of_link[link.light, link.index] for link in links if (link.light, link.index) in of_link}

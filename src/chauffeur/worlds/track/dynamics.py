@@ -53,7 +53,7 @@ def parameters() -> Any:
 
 
 def deliverable(acceleration_mps2: float, friction: float) -> float:
-    """What traction control and anti-lock brakes make of a wanted acceleration, m/s2. The models have neither."""
+    """Limit a wanted acceleration, m/s2, as traction control and anti-lock brakes do. The models have neither."""
     return min(max(acceleration_mps2, -BRAKES_MPS2 * friction), TRACTION_MPS2 * friction)
 
 

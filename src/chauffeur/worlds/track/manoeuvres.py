@@ -42,7 +42,7 @@ _APPROACH_M: Final = 30.0
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """What is driven.
+    """A manoeuvre: path, start and duration.
 
     Attributes:
         name: Which.
@@ -90,7 +90,7 @@ def _two_lanes() -> RoadGraph:
 
 
 def proving_ground(lanes: Iterable[Lane]) -> Box:
-    """What is paved around lanes on a proving ground: a car that slides off its lane leaves no road."""
+    """The paved area around lanes on a proving ground: a car that slides off its lane leaves no road."""
     held = tuple(lanes)
     points = [point for lane in held for point in lane.centre.points_m]
     xs, ys = [x for x, _ in points], [y for _, y in points]

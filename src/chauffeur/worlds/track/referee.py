@@ -46,7 +46,7 @@ class StreetReferee(PlaceJudge):
 
     @property
     def over(self) -> bool:
-        """Whether the car stands for good, or never began to move."""
+        """True if the car stands for good, or never began to move."""
         needed = _STANDS_S if self._moved else _PATIENCE_S
         if not self._near:
             needed = max(needed, self._waits_s)
@@ -59,12 +59,12 @@ class StreetReferee(PlaceJudge):
 
     @property
     def success(self) -> bool:
-        """Whether it stands where it was to stand."""
+        """True if it stands where it was to stand."""
         paced = self._peak is None or abs(self._most - self._peak) <= PACE_MPS
         return self.over and self._near and paced
 
     def metrics(self) -> tuple[Metric, ...]:
-        """How far beyond and to the left of where it was to end the car stands, and the time."""
+        """Offsets of the car beyond and to the left of the goal, and time."""
         along, across = self._missed_m()
         return (
             Metric("street-success-v1", float(self.success), "points"),
@@ -79,7 +79,7 @@ class StreetReferee(PlaceJudge):
 
 
 def end_of(trajectory: Trajectory, start: Pose) -> Pose:
-    """Where a trajectory ends, and how the car is headed there.
+    """Pose at the end of a trajectory.
 
     Args:
         trajectory: Waypoints in the ego frame.

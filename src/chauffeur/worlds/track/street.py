@@ -51,7 +51,7 @@ class Crosswalk:
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """What stands at the kerb; `at_m` is where it begins, from the ego, or from the end of the junction."""
+    """A thing at the kerb; `at_m` is where it begins, from the ego, or from the end of the junction."""
 
     __pydantic_config__: ClassVar[Any] = ConfigDict(extra="forbid")
 
@@ -83,7 +83,7 @@ class StreetConfig:
 
 @dataclass(frozen=True)
 class StreetScene:
-    """What a world drives in.
+    """Road, parked cars and cones of a street.
 
     Attributes:
         road: The lanes.
@@ -180,7 +180,7 @@ def _two_way(name: Arm, start: Pose, low_m: float, high_m: float, onward: tuple[
 
 
 def _box(config: StreetConfig) -> tuple[Box, ...]:
-    """What is paved of a junction: both streets, with the strips at their kerbs, straight across it."""
+    """The paved area of a junction: both streets, with the strips at their kerbs, straight across it."""
     if config.junction_m is None:
         return ()
     middle = config.junction_m + BOX_M / 2.0, LANE_M / 2.0

@@ -19,7 +19,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.path_follower import Chassis
-from chauffeur.worlds.skeleton import ShownWorld, config_of, finite
+from chauffeur.worlds.skeleton import WorldBase, config_of, finite, set_up
 from chauffeur.worlds.track.dynamics import (
     BRAKES_MPS2,
     DRIVE_LAG_S,
@@ -78,7 +78,7 @@ class TrackConfig(BaseModel):
     street: StreetConfig | None = None
 
 
-class TrackWorld(ShownWorld):
+class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
     """A test track, stepped at 20 Hz."""
 
     engine = "test track 1 (CommonRoad vehicle models 3.0.2)"
@@ -89,6 +89,12 @@ class TrackWorld(ShownWorld):
         turns=True,
         horizon_s=45.0,
     )
+    dt_s = DT_S
+    """Control period, s."""
+    chassis = CHASSIS
+    """The ego's size and axles."""
+    steering_rate = STEERING_RATE
+    """Steering rate of the ego, rad/s."""
 
     def __init__(self) -> None:
         self._config: TrackConfig | None = None
@@ -101,23 +107,6 @@ class TrackWorld(ShownWorld):
         self._rng = np.random.default_rng(0)
         self._tick = 0
         self._crashed = False
-        self._perception: ObservedPerception | None = None
-        self._driver: LaneDriver | None = None
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def chassis(self) -> Chassis:
-        """The ego's size and axles."""
-        return CHASSIS
-
-    @property
-    def steering_rate(self) -> float:
-        """How fast the ego's wheel turns, rad/s."""
-        return STEERING_RATE
 
     @property
     def car(self) -> KinematicBicycle | None:
@@ -145,12 +134,12 @@ class TrackWorld(ShownWorld):
 
     @property
     def ground(self) -> Box:
-        """What is paved: a proving ground around the lanes. Raises ScenarioError before the first reset."""
+        """The paved area: a proving ground around the lanes. Raises ScenarioError before the first reset."""
         return proving_ground(self._course.road.lanes)
 
     @property
     def manoeuvre(self) -> Manoeuvre:
-        """What is to be driven. Raises ScenarioError before the first reset, and on a street, where nothing is set."""
+        """The manoeuvre set. Raises ScenarioError before the first reset, and on a street, where nothing is set."""
         config = self._started()
         if config.street is not None:
             raise ScenarioError("On an open road no manoeuvre is set.", hint="Drive it with a trajectory or a program.")
@@ -158,7 +147,7 @@ class TrackWorld(ShownWorld):
 
     @property
     def open_road(self) -> bool:
-        """Whether it is a street, on which no manoeuvre is set."""
+        """True if it is a street, on which no manoeuvre is set."""
         return self._started().street is not None
 
     @property
@@ -168,7 +157,7 @@ class TrackWorld(ShownWorld):
 
     @property
     def weather(self) -> Weather:
-        """What the sky does."""
+        """Weather of the scenario."""
         return self._started().weather
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
@@ -222,18 +211,6 @@ class TrackWorld(ShownWorld):
             self._crashed, self._shown = True, None
         return Command(wanted, angle)
 
-    def perception(self) -> ObservedPerception:
-        """Questions about the present instant."""
-        self._started()
-        assert self._perception is not None
-        return self._perception
-
-    def driver(self) -> LaneDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        self._started()
-        assert self._driver is not None
-        return self._driver
-
     def body(self) -> tuple[Pose, float, float]:
         """Centre of mass and heading; speed over ground, m/s; yaw rate, rad/s: the truth of the plant."""
         x, y, _, along, heading, yaw_rate = self._state[:6].tolist()
@@ -245,9 +222,7 @@ class TrackWorld(ShownWorld):
         return float(state[10]) if len(state) > 10 else float(state[3] * math.sin(state[6]))
 
     def _started(self) -> TrackConfig:
-        if self._config is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._config
+        return set_up(self._config)
 
     def _lead(self) -> VehicleState | None:
         plan = self._course

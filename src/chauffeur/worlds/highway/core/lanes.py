@@ -117,7 +117,7 @@ def centre_at(lanes: Array, traits: Array, lane: int, s: float) -> tuple[float, 
 
 @compiled
 def within(lanes: Array, lane: int, s: float, r: float, margin: float) -> bool:
-    """Whether local coordinates are on a lane; it reaches a car length beyond both ends."""
+    """True if local coordinates are on a lane; it reaches a car length beyond both ends."""
     if abs(r) > lanes[lane, LANE_WIDTH] / 2.0 + margin:
         return False
     return s >= -CAR_M and s < lanes[lane, LANE_LENGTH] + CAR_M
@@ -125,7 +125,7 @@ def within(lanes: Array, lane: int, s: float, r: float, margin: float) -> bool:
 
 @compiled
 def reachable(lanes: Array, traits: Array, lane: int, x: float, y: float) -> bool:
-    """Whether a car may change to a lane from a point."""
+    """True if a car may change to a lane from a point."""
     if traits[lane, FORBIDDEN] == 1:
         return False
     s, r = local(lanes, traits, lane, x, y)
@@ -134,7 +134,7 @@ def reachable(lanes: Array, traits: Array, lane: int, x: float, y: float) -> boo
 
 @compiled
 def after_end(lanes: Array, traits: Array, lane: int, x: float, y: float) -> bool:
-    """Whether a point is past the last half car length of a lane."""
+    """True if a point is past the last half car length of a lane."""
     return along(lanes, traits, lane, x, y) > lanes[lane, LANE_LENGTH] - CAR_M / 2.0
 
 

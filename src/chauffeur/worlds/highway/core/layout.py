@@ -1,4 +1,4 @@
-"""How a road and its traffic lie in arrays. Row 0 is the ego, then the other vehicles in spawn order, then the objects.
+"""Array layout of a road and its traffic. Row 0 is the ego, then the other vehicles in spawn order, then the objects.
 
 The rows equal the ids of an observation. `order` lists all solid rows by their position along the road; it is only
 kept on highways, whose lanes are all parallel to +x.

@@ -1,4 +1,4 @@
-"""How vehicles move and touch: kinematic and dynamic bicycle, rectangles that push each other apart.
+"""Motion and contacts of vehicles: kinematic and dynamic bicycle, rectangles that push each other apart.
 
 Source: highway-env's `Vehicle`, `BicycleVehicle` (Rajamani, "Vehicle Dynamics and Control", 2011, Ch. 2) and
 `are_polygons_intersecting` (separating axes), on arrays.

@@ -50,7 +50,7 @@ _STEPS = 11  # 0.25 s to 2.75 s
 
 @compiled
 def _foresee_traffic(lanes: Array, traits: Array, roads: Array, floats: Array, ints: Array, i: int, out: Array) -> None:
-    """Where a car gets along its route at constant speed: rows of (x, y, heading)."""
+    """Predict a car along its route at constant speed: rows of (x, y, heading)."""
     lane = ints[i, LANE]
     start, _ = local(lanes, traits, lane, floats[i, X], floats[i, Y])
     for n in range(_STEPS):
@@ -67,7 +67,7 @@ def _foresee_traffic(lanes: Array, traits: Array, roads: Array, floats: Array, i
 
 @compiled
 def _foresee_ego(floats: Array, ints: Array, out: Array) -> None:
-    """Where the ego gets at constant speed and steering: rows of (x, y, heading)."""
+    """Predict the ego at constant speed and steering: rows of (x, y, heading)."""
     ghost, ghost_ints = floats[0:1].copy(), ints[0:1].copy()
     ghost[0, ACCELERATION] = 0.0
     state = np.empty(6)
@@ -85,7 +85,7 @@ def _foresee_ego(floats: Array, ints: Array, out: Array) -> None:
 def _corner_inside(
     ax: float, ay: float, a_heading: float, bx: float, by: float, b_heading: float, length: float, width: float
 ) -> bool:
-    """Whether a corner, edge middle or the centre of rectangle a lies in b (turned the wrong way, see above)."""
+    """True if a corner, edge middle or the centre of rectangle a lies in b (turned the wrong way, see above)."""
     ca, sa = math.cos(a_heading), math.sin(a_heading)
     cb, sb = math.cos(b_heading), math.sin(b_heading)
     for u in range(-1, 2):

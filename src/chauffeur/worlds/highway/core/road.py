@@ -154,7 +154,7 @@ class CoreRoad:
         return geometry.heading_at(self.road.lanes, self.road.traits, lane, self.along(lane, i))
 
     def reachable(self, lane: int) -> bool:
-        """Whether the ego may change to a lane from where it is."""
+        """True if the ego may change to a lane from where it is."""
         return bool(
             geometry.reachable(self.road.lanes, self.road.traits, lane, self.floats[0, at.X], self.floats[0, at.Y])
         )

@@ -1,4 +1,4 @@
-"""What is read off an instant: who is ahead, how close a collision is by three definitions, and the ego's driver.
+"""Quantities read off an instant: the lead, how close a collision is by three definitions, and the ego's driver.
 
 The three times to collision (s, -1 for none) are those of LaMPilot's code (along the ego's lane, whatever the lateral
 distance), of the paper's Eq. 1 (in the plane, between centres), and our lane-aware one (bumper to bumper, vehicles in

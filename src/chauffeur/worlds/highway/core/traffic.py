@@ -1,4 +1,4 @@
-"""What other drivers do: IDM along the lane, MOBIL across lanes, lane keeping; highway-env's `IDMVehicle` on arrays.
+"""Other drivers: IDM along the lane, MOBIL across lanes, lane keeping; highway-env's `IDMVehicle` on arrays.
 
 Source: Treiber et al. 2000 (IDM), Kesting et al. 2007 (MOBIL), in the form and with the constants of the highway-env
 package, of which every branch is kept: the reference world is the oracle of these functions.
