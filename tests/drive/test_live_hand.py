@@ -20,7 +20,7 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import STEP_MPS
 from chauffeur.drive.scenarios import find
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 
 SOURCE = Path(chauffeur.__file__).parent
 HOLD_20 = "def drive():\n    set_target_speed(20.0)\n    while True:\n        yield autopilot()\n"
@@ -32,12 +32,6 @@ def rig_on(folder: Path, sandbox: Sandbox, name: str, seed: int | None = None, l
     rig = Rig(folder, sandbox, (start,))
     rig.period()
     return rig
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as opened:
-        yield opened
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import BUILT_IN, find
 from chauffeur.executors.pursuit import ParametersDriver
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 from chauffeur.worlds.places import ParkingPlaces
 
 PLAIN = Parameters(22.0, 12.0, 1.0)
@@ -31,12 +31,6 @@ def start(name: str, seed: int | None = None, **changes: object) -> Start:
     scenario = find(name)
     made = Start(scenario, scenario.seed if seed is None else seed, most_s=300.0)
     return replace(made, **changes)  # pyright: ignore[reportArgumentType]
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as opened:
-        yield opened
 
 
 @pytest.fixture

@@ -28,12 +28,6 @@ def straight(speed_mps: float, seconds: float, period_s: float = 0.5) -> Traject
     return Trajectory(tuple((speed_mps * period_s * i, 0.0) for i in range(1, round(seconds / period_s) + 1)), period_s)
 
 
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox() as opened:
-        yield opened
-
-
 @pytest.fixture
 def begin(tmp_path: Path, sandbox: Sandbox) -> Iterator[Callable[[Start], Rig]]:
     rigs: list[Rig] = []
