@@ -7,7 +7,6 @@ import random
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from live_rig import Rig
@@ -403,10 +402,3 @@ def test_no_process_that_hears_a_model_holds_the_ring(rig: Rig) -> None:
     report = rig.bench.tick()
     assert not report.taken_over
     assert rig.bench.tick().level != "hand"
-
-
-def test_every_key_is_known_to_the_wheel(rig: Rig) -> None:
-    rig.bench.take_over(True)
-    for key in get_args(Key):
-        press(rig, key)
-    assert rig.reports[-1].faults == 0
