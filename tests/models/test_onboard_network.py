@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -265,11 +264,6 @@ def test_the_planner_plans_with_it(exported: Path) -> None:
     assert plan.policy.source == "def drive():\n    yield from lane_left()\n"
     assert "left lane" in plan.thoughts.text
     assert plan.usage.completion_tokens > 0
-
-
-def test_the_model_card_names_what_made_it(exported: Path) -> None:
-    about = json.loads((exported / "model.json").read_text())
-    assert about["version"] == "test"
 
 
 def test_it_may_be_held_to_the_numbers_that_were_said(exported: Path) -> None:
