@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from chauffeur.concept import SandboxError
+from chauffeur.drive.emergency import STOPPING
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import supervisor
 from chauffeur.drive.live.messages import Report, WheelHand
@@ -89,8 +90,15 @@ def test_a_wish_is_driven_while_every_other_process_is_killed_or_hangs(tmp_path:
         ticks = [report.tick for report in heard.reports[periods:]]
         assert len(ticks) > 2 and ticks == sorted(set(ticks)), "control went on meanwhile"
         until(runtime, lambda: heard.reports[-1].level == "follow")
-        runtime.stop()
         pids = [runtime.pid("control"), runtime.pid("policy"), runtime.pid("planner")]
+
+        answer = runtime.interactions[runtime.ask("Stop!")].answer
+        assert answer is not None and answer.text == STOPPING, "no planner is asked"
+        end = time.monotonic() + 60.0
+        while runtime.driving and time.monotonic() < end:
+            runtime.poll()
+            time.sleep(0.005)
+        runtime.poll()
         figures = runtime.figures()
     assert all(interaction.stage == "closed" for interaction in runtime.interactions.values())
     assert figures is not None
