@@ -88,19 +88,15 @@ from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.talk.session import Talk
-from chauffeur.drive.talk.messages import Say, Stop
+from chauffeur.drive.talk.messages import Say
 if __name__ == "__main__":
     with Talk(Settings((Start(find("overtake"), 17),), planner="onboard"), print) as session:
         session.take(Say("Overtake the car in front of you."))
-        until = time.monotonic() + 14.0  # telemetry waits some ten seconds before it sends for the first time
+        until = time.monotonic() + 13.0  # telemetry waits some ten seconds before it sends for the first time
         while session.driving and time.monotonic() < until:
             session.poll()
             time.sleep(0.02)
-        session.take(Stop())
-        until = time.monotonic() + 30.0
-        while session.driving and time.monotonic() < until:
-            session.poll()
-            time.sleep(0.02)
+        session.abort()
 """
     (tmp_path / "talk.py").write_text(talk)
     commands = [

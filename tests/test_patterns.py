@@ -128,8 +128,8 @@ def _growth(pattern: re.Pattern[str]) -> tuple[float, str]:
     """How much longer a text of `TIMES` the length takes, and which."""
     slow: list[tuple[float, int]] = []
     for kind, text in enumerate(_attacks(pattern, SHORT)):
-        if _cost_s(pattern, text[:40]) > 0.1:  # of 40 signs: it grows faster than any square
-            return float("inf"), text[:40]
+        if _cost_s(pattern, text[:30]) > 0.01:  # of 30 signs: it grows faster than any square
+            return float("inf"), text[:30]
         cost_s = _cost_s(pattern, text)
         if cost_s > QUICK_S:
             slow.append((cost_s, kind))

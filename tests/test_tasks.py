@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 sys.path.append(str(Path(__file__).resolve().parent / "planners"))
 from server import ModelServer
 
+from chauffeur.cli.main import app
 from chauffeur.concept import Program
 from chauffeur.drive.recording import read_trip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-WITHIN_S = 600
 SUITE = "chauffeur bench scenes generate --out suite --items 8 --extras 0"
 BLOCKS = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
@@ -67,19 +66,19 @@ def write(page: str, language: str, folder: Path) -> list[Path]:
 
 def run(lines: Sequence[str], folder: Path, *, path: Path | None = None, ends: int = 0) -> list[str]:
     """What each line prints; every one must end with an exit code."""
-    paths = [str(path)] if path else []
-    env = os.environ | {"PYTHONPATH": os.pathsep.join([*paths, os.environ.get("PYTHONPATH", "")]), "COLUMNS": "100"}
-    env |= {"CHAUFFEUR_API_KEY": "none"}
     said: list[str] = []
-    for line in lines:
-        words = shlex.split(line)
-        assert words[0] == "chauffeur"
-        done = subprocess.run(
-            [sys.executable, "-m", *words], cwd=folder, env=env, stdin=subprocess.DEVNULL, capture_output=True,
-            text=True, timeout=WITHIN_S, check=False,
-        )  # fmt: skip
-        assert done.returncode == ends, f"{line}\n{done.stdout}\n{done.stderr}"
-        said.append(" ".join(done.stdout.split()))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("COLUMNS", "100")
+        patch.setenv("CHAUFFEUR_API_KEY", "none")
+        if path is not None:
+            patch.syspath_prepend(path)
+        for line in lines:
+            program, *words = shlex.split(line)
+            assert program == "chauffeur"
+            done = CliRunner().invoke(app, words)
+            assert done.exit_code == ends, f"{line}\n{done.output}\n{done.exception}"
+            said.append(" ".join(done.stdout.split()))
     return said
 
 

@@ -15,7 +15,6 @@ from chauffeur.concept import NOBODY, Limits, Parameters, Plan, PlanRequest, Pro
 from chauffeur.drive.emergency import ASKED, GOING_ON, QUESTION, STOPPING
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import find
@@ -140,16 +139,6 @@ def notes(said: list[Said]) -> list[str]:
     return [each.text for each in said if isinstance(each, Note)]
 
 
-@pytest.mark.parametrize("told", [Say(STOPS[1]), Evaluate(STOPS[2])], ids=["typed", "opinion"])
-def test_a_session_stops(told: Say | Evaluate) -> None:
-    said: list[Said] = []
-    with Talk(settings(), said.append) as talk:
-        talk.take(told)  # of a terminal, and of the cabin page
-        assert talk.stopping and STOPPING in notes(said)
-        until(talk, said, lambda: not talk.driving)
-    assert talk.outcome == "stopped"
-
-
 def test_a_session_goes_on_asks_once_and_does_what_a_yes_says() -> None:
     said: list[Said] = []
     with Talk(settings("emergency-lane"), said.append) as talk:
@@ -165,22 +154,10 @@ def test_a_session_goes_on_asks_once_and_does_what_a_yes_says() -> None:
         conversations = [each for each in said if each.kind == "conversation"]
         assert conversations == []
         until(talk, said, lambda: any(each.kind == "conversation" and each.stage == "driven" for each in said))  # pyright: ignore
-        talk.take(Say("stop"))
+        talk.take(Evaluate(STOPS[2]))  # of the cabin page; lines that are typed have a test below
+        assert talk.stopping and STOPPING in notes(said)
         until(talk, said, lambda: not talk.driving)
     assert talk.outcome == "stopped"
-
-
-def test_whoever_hands_a_stop_to_the_runtime_has_it_done() -> None:
-    with Runtime(settings()) as runtime:
-        wish = runtime.ask(STOPS[0])
-        answer = runtime.interactions[wish].answer
-        assert answer is not None and answer.text == STOPPING
-        end_s = time.monotonic() + WITHIN_S
-        while runtime.driving and time.monotonic() < end_s:
-            runtime.poll()
-            time.sleep(0.005)
-        runtime.poll()
-        assert runtime.report is not None and runtime.report.outcome == "stopped"
 
 
 def test_a_stop_that_was_heard_badly_is_not_asked_back() -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.judge.effects import effect_of
-from chauffeur.programs import UNHURRIED, ProgramExecutor, Sandbox
+from chauffeur.programs import ProgramExecutor, Sandbox
 from chauffeur.safety.faithfulness import Effect, FactSurroundings, judge, read_facts
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -44,12 +43,6 @@ CROSS = """def drive():
         yield autopilot()
 """
 BROKEN = "def drive():\n    yield autopilot()\n    x = 1 / 0\n    yield autopilot()\n"
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as sandbox:
-        yield sandbox
 
 
 @pytest.fixture

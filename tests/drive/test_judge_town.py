@@ -100,61 +100,47 @@ def car(colour: str, state: str | None = None) -> Any:
     return {"kind": "car", "colour": colour, **({"state": state} if state else {})}
 
 
+RED_BUS = {"kind": "bus", "colour": "red"}
 WALKER = {"kind": "pedestrian"}
+YELLOW_WALKER = {**WALKER, "colour": "yellow"}
 TO_RIGHT, TO_LEFT = {"act": "turn", "side": "right"}, {"act": "turn", "side": "left"}
+
+
+GONE = {"type": "until", "event": "gone", "ref": WALKER}
+GREEN = {"type": "once", "event": "green", "ref": {"kind": "light"}}
+VAN_GONE = {"type": "after", "event": "gone", "ref": {"kind": "van", "colour": "white"}}
+
+
+def at(rel: str, ref: Any) -> Any:
+    return {"rel": rel, "ref": ref}
 
 
 @pytest.mark.parametrize(
     ("acts", "stage", "start"),
     [
-        ([{"act": "park", "place": {"rel": "behind", "ref": car("silver")}}], [BUS, BLUE, SILVER], RIGHT_LANE),
-        (
-            [{"act": "follow", "target": {"kind": "bus", "colour": "red"}}],
-            [{**BUS, "turns": ["right"]}, BLUE],
-            RIGHT_LANE,
-        ),
+        ([{"act": "park", "place": at("behind", car("silver"))}], [BUS, BLUE, SILVER], RIGHT_LANE),
+        ([{"act": "follow", "target": RED_BUS}], [{**BUS, "turns": ["right"]}, BLUE], RIGHT_LANE),
         ([{"act": "follow", "target": {"kind": "bus", "deictic": True}}], [{**BUS, "turns": ["left"]}], LEFT_LANE),
+        ([{"act": "wait", "when": GONE}, TO_RIGHT], [CROSSES, SILVER], RIGHT_LANE),
+        ([{"act": "yield", "target": YELLOW_WALKER}, {"act": "straight"}], [CROSSES, STANDS], RIGHT_LANE),
+        ([{"act": "straight", "when": GREEN}], [SILVER], RIGHT_LANE),
+        ([{**TO_LEFT, "when": VAN_GONE}], [COMING], LEFT_LANE),
         (
-            [{"act": "wait", "when": {"type": "until", "event": "gone", "ref": WALKER}}, TO_RIGHT],
-            [CROSSES, SILVER],
-            RIGHT_LANE,
+            [TO_RIGHT, {"act": "stop", "place": at("behind", car("black", "parked"))}],
+            [{**BLUE, "colour": "black"}, *CORNER], RIGHT_LANE,
         ),
         (
-            [{"act": "yield", "target": {**WALKER, "colour": "yellow"}}, {"act": "straight"}],
-            [CROSSES, STANDS],
-            RIGHT_LANE,
+            [{"act": "stop", "place": at("beside", {**WALKER, "colour": "red"})}],
+            [{**STANDS, "ahead_m": 40.0}, {**STANDS, "colour": "blue"}], RIGHT_LANE,
         ),
         (
-            [{"act": "straight", "when": {"type": "once", "event": "green", "ref": {"kind": "light"}}}],
-            [SILVER],
-            RIGHT_LANE,
-        ),
-        (
-            [{**TO_LEFT, "when": {"type": "after", "event": "gone", "ref": {"kind": "van", "colour": "white"}}}],
-            [COMING],
-            LEFT_LANE,
-        ),
-        (
-            [TO_RIGHT, {"act": "stop", "place": {"rel": "behind", "ref": car("black", "parked")}}],
-            [{**BLUE, "colour": "black"}, *CORNER],
-            RIGHT_LANE,
-        ),
-        (
-            [{"act": "stop", "place": {"rel": "beside", "ref": {**WALKER, "colour": "red"}}}],
-            [{**STANDS, "ahead_m": 40.0}, {**STANDS, "colour": "blue"}],
-            RIGHT_LANE,
-        ),
-        (
-            [
-                {"act": "pass", "target": car("blue", "parked"), "manner": "slow"},
-                {"act": "stop", "place": {"rel": "in_front_of", "ref": car("silver")}},
-            ],
-            [BLUE, SILVER],
-            RIGHT_LANE,
+            [{"act": "pass", "target": car("blue", "parked"), "manner": "slow"},
+             {"act": "stop", "place": at("in_front_of", car("silver"))}],
+            [BLUE, SILVER], RIGHT_LANE,
         ),
         ([TO_LEFT, TO_RIGHT], [], LEFT_LANE),
     ],
-)
+)  # fmt: skip
 def test_what_is_asked_for_is_done(acts: list[Any], stage: list[Any], start: Any) -> None:
     trip, judge = driven("As labelled.", stage, ByActs(acts), acts=acts, start=start)
     assert judge is not None, trip.trip.plan.thoughts.text
@@ -178,25 +164,15 @@ def test_a_bus_that_turns_is_followed_round_the_corner() -> None:
 
 
 @pytest.mark.parametrize(
-    ("act", "stage", "start", "words"),
+    ("act", "start", "words"),
     [
-        (
-            {"act": "park", "place": {"rel": "behind", "ref": car("green")}},
-            [BLUE, SILVER],
-            RIGHT_LANE,
-            "I see no green car.",
-        ),
-        (
-            {"act": "park", "place": {"rel": "behind", "ref": {"kind": "car"}}},
-            [BLUE, SILVER],
-            RIGHT_LANE,
-            "Which car do you mean: the blue one or the silver one?",
-        ),
-        (TO_LEFT, [], ("0:0:1", 6.0), "no way leads to the left"),
+        ({"act": "park", "place": at("behind", car("green"))}, RIGHT_LANE, "I see no green car."),
+        ({"act": "park", "place": at("behind", {"kind": "car"})}, RIGHT_LANE, "the blue one or the silver one?"),
+        (TO_LEFT, ("0:0:1", 6.0), "no way leads to the left"),
     ],
 )
-def test_what_cannot_be_done_is_said_before_driving(act: Any, stage: list[Any], start: Any, words: str) -> None:
-    trip, _ = driven("As labelled.", stage, ByActs([act]), start=start)
+def test_what_cannot_be_done_is_said_before_driving(act: Any, start: Any, words: str) -> None:
+    trip, _ = driven("As labelled.", [BLUE, SILVER], ByActs([act]), start=start)
     assert words in trip.trip.plan.refusal
     assert trip.frames == ()
 
@@ -219,24 +195,15 @@ def test_what_is_left_out_is_asked_about_part_by_part() -> None:
 ON = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
 HALT = "def go():\n    for _ in range(400):\n        yield stop()\n"
 RIGHT = ON.replace("    while", "    turn_right_at_next_intersection()\n    while")
-GREEN = {"act": "straight", "when": {"type": "once", "event": "green", "ref": {"kind": "light"}}}
+ON_GREEN = {"act": "straight", "when": GREEN}
+GATE = {"kind": "gate"}
 
 
 @pytest.mark.parametrize(
     ("program", "act", "stage", "result"),
     [
-        (
-            ON,
-            {"act": "park", "place": {"rel": "behind", "ref": {"kind": "car", "colour": "silver"}}},
-            [SILVER],
-            "not_done",
-        ),
-        (
-            HALT,
-            {"act": "stop", "place": {"rel": "behind", "ref": {"kind": "car", "colour": "silver"}}},
-            [SILVER],
-            "not_done",
-        ),
+        (ON, {"act": "park", "place": at("behind", car("silver"))}, [SILVER], "not_done"),
+        (HALT, {"act": "stop", "place": at("behind", car("silver"))}, [SILVER], "not_done"),
         (HALT, {"act": "stop"}, [], "done"),
         (HALT, {"act": "follow", "target": {"kind": "bus"}}, [BUS], "not_done"),
         (ON, {"act": "follow", "target": {"kind": "bus"}}, [BUS], "done"),
@@ -244,20 +211,15 @@ GREEN = {"act": "straight", "when": {"type": "once", "event": "green", "ref": {"
         (RIGHT, {"act": "turn", "side": "left"}, [], "opposite"),
         (RIGHT, {"act": "turn", "side": "right"}, [], "done"),
         (RIGHT, {"act": "turn", "side": "right", "not": True}, [], "opposite"),
-        (ON, GREEN, [], "done"),
-        (HALT, GREEN, [], "not_done"),
-        (ON, {"act": "yield", "target": {"kind": "pedestrian"}}, [CROSSES], "done"),
+        (ON, ON_GREEN, [], "done"),
+        (HALT, ON_GREEN, [], "not_done"),
+        (ON, {"act": "yield", "target": WALKER}, [CROSSES], "done"),
         (ON, {"act": "lane", "side": "left"}, [], "not_done"),
-        (ON, {"act": "avoid", "target": {"kind": "car", "colour": "blue"}}, [BLUE], "done"),
-        (HALT, {"act": "avoid", "target": {"kind": "car", "colour": "blue"}}, [BLUE], "not_done"),
-        (ON, {"act": "stop", "place": {"rel": "near", "ref": {"kind": "gate"}}}, [], "not_done"),
-        (HALT, {"act": "stop", "place": {"rel": "near", "ref": {"kind": "gate"}}}, [], "not_judged"),
-        (
-            ON,
-            {"act": "straight", "when": {"type": "once", "event": "opens", "ref": {"kind": "gate"}}},
-            [],
-            "not_judged",
-        ),
+        (ON, {"act": "avoid", "target": car("blue")}, [BLUE], "done"),
+        (HALT, {"act": "avoid", "target": car("blue")}, [BLUE], "not_done"),
+        (ON, {"act": "stop", "place": at("near", GATE)}, [], "not_done"),
+        (HALT, {"act": "stop", "place": at("near", GATE)}, [], "not_judged"),
+        (ON, {"act": "straight", "when": {"type": "once", "event": "opens", "ref": GATE}}, [], "not_judged"),
         (RIGHT, {"act": "u_turn"}, [], "not_done"),
     ],
 )

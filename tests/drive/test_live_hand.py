@@ -7,7 +7,6 @@ import random
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from live_rig import Rig
@@ -20,7 +19,7 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import STEP_MPS
 from chauffeur.drive.scenarios import find
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 
 SOURCE = Path(chauffeur.__file__).parent
 HOLD_20 = "def drive():\n    set_target_speed(20.0)\n    while True:\n        yield autopilot()\n"
@@ -32,12 +31,6 @@ def rig_on(folder: Path, sandbox: Sandbox, name: str, seed: int | None = None, l
     rig = Rig(folder, sandbox, (start,))
     rig.period()
     return rig
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as opened:
-        yield opened
 
 
 @pytest.fixture
@@ -409,10 +402,3 @@ def test_no_process_that_hears_a_model_holds_the_ring(rig: Rig) -> None:
     report = rig.bench.tick()
     assert not report.taken_over
     assert rig.bench.tick().level != "hand"
-
-
-def test_every_key_is_known_to_the_wheel(rig: Rig) -> None:
-    rig.bench.take_over(True)
-    for key in get_args(Key):
-        press(rig, key)
-    assert rig.reports[-1].faults == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import BUILT_IN, find
 from chauffeur.executors.pursuit import ParametersDriver
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 from chauffeur.worlds.places import ParkingPlaces
 
 PLAIN = Parameters(22.0, 12.0, 1.0)
@@ -31,12 +30,6 @@ def start(name: str, seed: int | None = None, **changes: object) -> Start:
     scenario = find(name)
     made = Start(scenario, scenario.seed if seed is None else seed, most_s=300.0)
     return replace(made, **changes)  # pyright: ignore[reportArgumentType]
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as opened:
-        yield opened
 
 
 @pytest.fixture
@@ -306,17 +299,6 @@ def test_parameters_that_lead_nowhere_are_refused_by_control_too_and_what_it_had
     assert report.faults == 0
 
 
-def test_garbage_in_parameters_is_counted_and_the_last_good_wish_goes_on(begin: Begin) -> None:
-    rig = begin(start("cruise"))
-    rig.order(PLAIN)
-    wish = rig.period(3)
-    fields = json.loads(wish.encode())
-    fields["steered"]["ahead"] = -5.0
-    rig.bench.setpoints.write(json.dumps(fields).encode())
-    report = rig.bench.tick()
-    assert (report.level, report.plan, report.refused) == ("follow", "w1", {"ahead out of range": 1})
-
-
 # Let go of ------------------------------------------------------------------------------------------------------------
 
 
@@ -354,16 +336,6 @@ def test_silence_leads_down_the_ladder_to_a_stand_and_wishes_lead_back(begin: Be
         rig.period(150)
         assert rig.reports[-1].lane == before, "and came back, for that is where the plan drives"
     assert well(rig)
-
-
-def test_a_plan_that_expired_is_followed_no_longer(begin: Begin) -> None:
-    rig = begin(start("cruise"))
-    rig.order(PLAIN, expires_ns=rig.bench.now_ns + 10**9)
-    rig.period(8)
-    assert rig.reports[-1].level == "follow"
-    rig.period(10)
-    assert rig.reports[-1].level == "keep"
-    assert rig.reports[-1].setpoints.time_headway_s >= 2.0
 
 
 def test_parameters_go_on_when_the_process_dies_even_where_no_way_could_be_found_anew(begin: Begin) -> None:

@@ -16,7 +16,7 @@ from chauffeur.drive.live.plan_messages import TAKES_BACK, PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 
 HOLD_20 = """
 def drive():
@@ -53,12 +53,6 @@ def drive():
     y = x[3]
     yield autopilot()
 """
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as opened:
-        yield opened
 
 
 @pytest.fixture

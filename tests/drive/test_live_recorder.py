@@ -83,7 +83,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     answers = folder / "answers.jsonl"
     answers.write_text("\n".join(json.dumps({"version": 1, "instruction": w, "plan": p}) for w, p in plans))
     start = Start(SCENARIO, 3, most_s=600.0)
-    settings = Settings(starts=(start,), planner=f"replay/{answers}", speed=2.0, realtime=False)
+    settings = Settings(starts=(start,), planner=f"replay/{answers}", speed=8.0, realtime=False)
     log = folder / "audit.jsonl"
     memory = VaultMemory(folder / MEMORY)
     with LiveRecorder(open_audit(log, SCENARIO, 3), DT_S) as books:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +11,9 @@ import pytest
 from live_rig import Rig
 
 from chauffeur.concept import ActionMatrix, Limits, Scenario, Trajectory
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import MOST_WAYPOINTS, LiveSetpoints, MessageError, Report, Steered
+from chauffeur.drive.live.messages import MOST_WAYPOINTS, LiveSetpoints, MessageError, Steered
 from chauffeur.drive.live.plan_messages import PlannedScene
-from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find
 from chauffeur.geometry import Pose
 from chauffeur.programs import Sandbox
@@ -32,12 +26,6 @@ EMPTY_LOT = Start(Scenario("lot", "parking", {"cars": 0, "walkers": 0, "ego_spee
 
 def straight(speed_mps: float, seconds: float, period_s: float = 0.5) -> Trajectory:
     return Trajectory(tuple((speed_mps * period_s * i, 0.0) for i in range(1, round(seconds / period_s) + 1)), period_s)
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox() as opened:
-        yield opened
 
 
 @pytest.fixture
@@ -61,13 +49,17 @@ def ego_of(rig: Rig) -> Pose:
     return Pose(ego.x_m, ego.y_m, ego.heading_rad)
 
 
-def test_a_trajectory_is_driven_to_its_end_and_no_further(begin: Callable[[Start], Rig]) -> None:
+@pytest.mark.parametrize("dies", [False, True])
+def test_a_trajectory_is_driven_to_its_end_and_no_further(begin: Callable[[Start], Rig], dies: bool) -> None:
     rig = begin(EMPTY_LOT)
     begun = ego_of(rig)
     rig.order(straight(2.0, 5.0))
-    rig.period(110)
+    rig.period(20)
+    if dies:
+        rig.die()
+    rig.period(90)
     forward, left = begun.sees(ego_of(rig).x_m, ego_of(rig).y_m)
-    assert rig.kinds() == [("started", "w1"), ("finished", "w1")]
+    assert rig.kinds() == [("started", "w1"), *([("resumed", "w1")] if dies else []), ("finished", "w1")]
     assert forward == pytest.approx(10.0, abs=2.0)
     assert abs(left) < 0.1
     last = rig.reports[-1]
@@ -163,35 +155,3 @@ def test_the_longest_trajectory_fits_where_wishes_are_written(begin: Callable[[S
     assert isinstance(wish, LiveSetpoints)
     pose = (12345.678, -9876.543, -3.14159, 22.345)
     rig.bench.setpoints.write(replace(wish, steered=Steered(Trajectory(points, 0.1), "a" * 200, pose)).encode())
-
-
-def test_a_trajectory_is_driven_by_the_processes_themselves_although_the_policy_dies(tmp_path: Path) -> None:
-    """Planner, policy and control in processes of their own; the trajectory from a recorded planner."""
-    words = "Go ahead ten metres."
-    policy = {"kind": "trajectory", "period_s": 0.5, "waypoints_m": [[1.0 * i, 0.0] for i in range(1, 25)]}
-    answers = tmp_path / "answers.jsonl"
-    plan = {"thoughts": {"text": "Straight on."}, "policy": policy}
-    answers.write_text(json.dumps({"version": 1, "instruction": words, "plan": plan}))
-    heard: list[DriveEvent] = []
-    settings = Settings((replace(EMPTY_LOT, most_s=60.0),), planner=f"replay/{answers}", speed=2.0, realtime=False)
-    end = time.monotonic() + 90.0
-    with Runtime(settings, heard.append) as runtime:
-        wish = runtime.ask(words)
-        killed = False
-        while runtime.interactions[wish].answer is None:
-            assert time.monotonic() < end, "it did not come to pass in time"
-            assert runtime.driving, "control has ended"
-            runtime.poll()
-            if not killed and runtime.report is not None and runtime.report.plan == wish:
-                os.kill(runtime.pid("policy"), signal.SIGKILL)
-                killed = True
-            time.sleep(0.005)
-        answer = runtime.interactions[wish].answer
-        runtime.stop()
-    assert killed
-    assert answer is not None
-    assert answer.kind == "finished", answer
-    reports = [one.value for one in heard if isinstance(one.value, Report)]
-    assert any(one.kind == "resumed" for one in heard)
-    assert (reports[-1].outcome, reports[-1].faults, reports[-1].refused) == ("stopped", 0, {})
-    assert max(report.speed_mps for report in reports) < 2.6

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
 from chauffeur.concept import Metric, Outcome
 from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, label, rehearse, tries
-from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs import Sandbox
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -66,12 +66,6 @@ class NearTo:
 
     def metrics(self) -> tuple[Metric, ...]:
         return ()
-
-
-@pytest.fixture(scope="module")
-def sandbox() -> Iterator[Sandbox]:
-    with Sandbox(UNHURRIED) as one:
-        yield one
 
 
 @pytest.fixture

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,14 +115,19 @@ def test_what_ships_is_of_these_kinds() -> None:
 
 def test_the_command_writes_sorters_and_their_card(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     names: tuple[tables.Name, ...] = ("wishes", "remarks", "town", "weather")
-    some = {name: sentences(name)[::60] for name in names}
+    some = {name: sentences(name)[::150] for name in names}
 
     def few(seed: int, without: Collection[str] = ()) -> tuple[Sentence, ...]:
         return tuple(one for one in some["weather"] if seed == 0 and one.writer not in without)
 
+    def quick(do: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda some, kinds, recipe, *told: do(some, kinds, replace(recipe, epochs=2), *told)
+
+    monkeypatch.setattr(pipeline, "train", quick(train))
+    monkeypatch.setattr(pipeline, "by_writer", quick(by_writer))
     monkeypatch.setattr(pipeline, "sentences", some.__getitem__)
     monkeypatch.setattr(pipeline, "weather_sentences", few)
-    monkeypatch.setattr(pipeline, "drawn", lambda seed: drawn(seed)[::60])
+    monkeypatch.setattr(pipeline, "drawn", lambda seed: drawn(seed)[::200])
     result = CliRunner().invoke(app, ["model", "train", "sorters", "--out", str(tmp_path / "made"), "--measured"])
     assert result.exit_code == 0, result.output
     card = (tmp_path / "made" / "CARD.md").read_text()

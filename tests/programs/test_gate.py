@@ -23,9 +23,7 @@ REFUSED: dict[str, tuple[str, str, int, str]] = {
     "invented brake": ("emergency_brake()", "unknown-name", 3, "set_target_speed"),
     "near miss": ("get_speed(ego)", "unknown-name", 3, "did you mean get_speed_of?"),
     "typo of own name": ("target = 3\nset_target_speed(targt)", "unknown-name", 4, "did you mean target?"),
-    "file": ("open('x')", "unknown-name", 3, "cannot reach files"),
     "sleep": ("sleep(1)", "unknown-name", 3, "yield autopilot()"),
-    "math without import": ("say(str(math.pi))", "unknown-name", 3, "import math"),
     "too many arguments": ("get_speed_of(ego, ego)", "call", 3, "at most 1 (veh), but is given 2"),
     "no arguments": ("get_ego_vehicle(1)", "call", 3, "takes no arguments"),
     "missing argument": ("set_target_speed()", "call", 3, "needs 'target_speed'"),
@@ -45,33 +43,14 @@ REFUSED: dict[str, tuple[str, str, int, str]] = {
     "tuple as lane": ("set_target_lane(('a', 'b', 0))", "argument", 3, "needs a lane"),
     "lane as vehicle": ("get_speed_of(get_lane_of(ego))", "argument", 3, "is given a lane"),
     "vehicle as lane": ("set_target_lane(ego)", "argument", 3, "is given a vehicle"),
-    "vehicle's attribute": ("say(str(ego.speed))", "attribute", 3, "use get_speed_of(vehicle)"),
     "vehicle's lane": ("x = ego.lane_index", "attribute", 3, "use get_lane_of(vehicle)"),
-    "api as method": ("ego.get_speed_of()", "attribute", 3, "write get_speed_of(...)"),
     "setting an attribute": ("ego.speed = 3", "attribute", 3, "get_speed_of"),
-    "private attribute": ("x = ego.__class__", "attribute", 3, "private"),
-    "unknown math": ("import math\nx = math.squareroot(4)", "attribute", 4, "math has no squareroot"),
     "indexing a lane": ("lane = get_lane_of(ego)\nx = lane[2]", "handle", 4, "cannot be indexed"),
     "arithmetic on a lane": ("x = get_lane_of(ego) - 1", "handle", 3, "get_left_lane"),
     "comparing vehicles": ("x = ego < ego", "handle", 3, "has no order"),
-    "written handle": ("x = 'veh:3'", "handle", 3, "cannot be written down"),
     "identity": ("front = detect_front_vehicle_in(get_lane_of(ego))\nx = front is ego", "is", 4, "use == or !="),
-    "import": ("import os", "import", 3, "os cannot be imported"),
-    "from import": ("from random import random", "import", 3, "only math"),
-    "math name": ("from math import squareroot", "import", 3, "math has no squareroot"),
-    "reserved name": ("__tick__(1, 2)", "reserved", 3, "reserved"),
-    "reserved binding": ("__site__ = 3", "reserved", 3, "reserved"),
-    "shadowed api": ("say = 3", "shadow", 3, "say is a driving API"),
-    "shadowed search": ("any = 3", "shadow", 3, "any is a built-in"),
-    "class": ("class A:\n    pass", "not-allowed", 3, "classes are not part"),
-    "with": ("with ego:\n    pass", "not-allowed", 3, "`with` is not part"),
-    "del": ("del ego", "not-allowed", 3, "assign None instead"),
     "match": ("match 3:\n    case _:\n        pass", "not-allowed", 3, "use if and elif"),
-    "bytes": ("x = b'a'", "not-allowed", 3, "bytes"),
-    "yield in lambda": ("f = lambda: (yield)", "not-allowed", 3, "a lambda cannot yield"),
-    "yield in f-string": ("x = f'{(yield)}'", "not-allowed", 3, "f-string"),
     "decorator": ("@say\ndef f():\n    pass", "not-allowed", 4, "decorators"),
-    "endless loop": ("while True:\n    pass", "no-yield", 3, "never yields"),
     "polling loop": ("safe = False\nwhile not safe:\n    safe = is_safe_enter(None)", "no-yield", 4, "never yields"),
     "unreachable yield": ("while True:\n    continue\n    yield", "no-yield", 3, "can never be reached"),
     "long count": ("for i in range(1000000):\n    x = i", "no-yield", 3, "1000000 passes"),
@@ -81,14 +60,9 @@ REFUSED: dict[str, tuple[str, str, int, str]] = {
     "kept zip": ("z = zip([1], [2])", "lazy", 3, "list(zip(...))"),
     "search in f-string": ("say(f'{any(i for i in [1])}')", "lazy", 3, "assign it to a name first"),
     "two-argument iter": ("x = iter(get_target_speed, 3)", "lazy", 3, "iter takes one argument"),
-    "yield from a list": ("yield from [1, 2]", "yield-from", 3, "direct call of a generator function"),
 }
 
 PROGRAMS: dict[str, tuple[str, str, int | None, str]] = {
-    "empty": ("", "no-main", None, "defines no function"),
-    "no yield": ("def main():\n    set_target_speed(20)\n", "no-main", 1, "main never yields"),
-    "argument": ("def main(ego):\n    yield autopilot()\n", "no-main", 1, "main needs arguments"),
-    "syntax": ("def main(:\n    yield\n", "syntax", 1, "not valid Python"),
     "prose": ("Sure! Here is the program.", "syntax", 1, "not valid Python"),
     "too long": ("#" * 30_000, "syntax", None, "20000 are allowed"),
     "too deep": (f"x = {'[' * 60}{']' * 60}", "syntax", 1, "nested too deeply"),
@@ -98,26 +72,8 @@ PROGRAMS: dict[str, tuple[str, str, int | None, str]] = {
         4,
         "yield from helper(...)",
     ),
-    "kept generator object": (
-        "def helper():\n    yield 1\ndef main():\n    g = helper()\n    yield from g\n",
-        "generator-use",
-        4,
-        "can only be called as `yield from helper(...)`",
-    ),
     "main called": ("def main():\n    yield autopilot()\nmain()\n", "generator-use", 3, "called for you"),
     "policy assigned": ("def main():\n    yield autopilot()\npolicy = main()\n", "generator-use", 3, "called for you"),
-    "api at top level": (
-        "ego = get_ego_vehicle()\ndef main():\n    yield\n",
-        "top-level",
-        1,
-        "before the drive begins",
-    ),
-    "api as default": (
-        "def main(speed=get_speed_limit()):\n    yield autopilot()\n",
-        "top-level",
-        1,
-        "before the drive begins",
-    ),
     "async": ("async def main():\n    yield 1\n", "not-allowed", 1, "async functions"),
     "generator rebound": (
         "def helper():\n    yield\nhelper = 3\ndef main():\n    yield from helper()\n",
@@ -197,11 +153,6 @@ def test_library_functions_are_known_and_checked_alike() -> None:
     assert not check_source("def main():\n    for x in wait(3):\n        yield\n", library).passed
     broken = check_source("def main():\n    yield\n", "def wait(:\n")
     assert [f.code for f in broken.findings] == ["library"]
-
-
-def test_windows_line_ends_count_like_others() -> None:
-    report = check_source("def main():\r\n    nobody()\r\n    yield\r\n")
-    assert [f.line for f in report.errors] == [2]
 
 
 def test_findings_are_few_and_quick_however_broken_the_text() -> None:

@@ -147,34 +147,6 @@ class DriveRecorder(SessionRecorder):
         """
         self.guarded(_GUARDED.get(event.kind, "outcome"), lambda: self._hear(event))
 
-    def period(
-        self,
-        tick: int,
-        time_s: float,
-        speed_mps: float,
-        setpoints: Setpoints,
-        requested: Command,
-        applied: Command,
-        program: str,
-        interventions: Sequence[Intervention],
-    ) -> None:
-        """One control period of a drive that leaves no frames: in real time, control says what it did.
-
-        Args:
-            tick: Control period.
-            time_s: Since the trip began.
-            speed_mps: Of the ego, before the command.
-            wishes: What was handed to the driver.
-            requested: What the driver asked for.
-            applied: What the vehicle did.
-            program: State of the program.
-            interventions: Of the shield.
-        """
-        self.guarded(
-            "actuation",
-            lambda: self._period(tick, time_s, speed_mps, setpoints, requested, applied, program, (), interventions),
-        )
-
     def hand_over(self) -> None:
         """Hand over the commands and interventions collected so far."""
         for rule in list(self._interventions):
@@ -217,8 +189,12 @@ class DriveRecorder(SessionRecorder):
 
     def _hear(self, event: DriveEvent) -> None:
         match event.value:
-            case Frame():
-                self._frame(event.value)
+            case Frame(observation=shot) as frame:
+                self._driven = True
+                self.period(
+                    shot.tick, shot.time_s, shot.ego.speed_mps, frame.setpoints, frame.requested, frame.applied,
+                    frame.program, frame.interventions, frame.said,
+                )  # fmt: skip
                 return
             case Trip():
                 self._trip(event.value)
@@ -255,33 +231,31 @@ class DriveRecorder(SessionRecorder):
         body = {"outcome": "broken_off" if self._driven else "not_driven", "error": type(error).__name__}
         self.personal("outcome", "", body, {"detail": str(error)})
 
-    def _frame(self, frame: Frame) -> None:
-        shot = frame.observation
-        self._driven = True
-        self._period(
-            shot.tick,
-            shot.time_s,
-            shot.ego.speed_mps,
-            frame.setpoints,
-            frame.requested,
-            frame.applied,
-            frame.program,
-            frame.said,
-            frame.interventions,
-        )
-
-    def _period(
+    def period(
         self,
         tick: int,
         time_s: float,
         speed_mps: float,
         setpoints: Setpoints,
-        asked: Command,
-        done: Command,
+        requested: Command,
+        applied: Command,
         program: str,
-        said: Sequence[str],
         interventions: Sequence[Intervention],
+        said: Sequence[str] = (),
     ) -> None:
+        """Record one control period.
+
+        Args:
+            tick: Control period.
+            time_s: Since the trip began.
+            speed_mps: Of the ego, before the command.
+            setpoints: Handed to the driver.
+            requested: Command that the driver asked for.
+            applied: Command that the vehicle carried out.
+            program: State of the program.
+            interventions: Of the shield.
+            said: By the program.
+        """
         batch = self._batch
         if batch is not None and (
             tick != batch.first_tick + len(batch.requested) or time_s - batch.first_s >= BATCH_S - _ROUNDING_S
@@ -290,9 +264,9 @@ class DriveRecorder(SessionRecorder):
             batch = None
         if batch is None:
             batch = self._batch = _Batch(tick, time_s, time_s)
-        if done != asked:
-            batch.applied.append((len(batch.requested), done.acceleration_mps2, done.steering_rad))
-        batch.requested.append((asked.acceleration_mps2, asked.steering_rad))
+        if applied != requested:
+            batch.applied.append((len(batch.requested), applied.acceleration_mps2, applied.steering_rad))
+        batch.requested.append((requested.acceleration_mps2, requested.steering_rad))
         batch.speed_mps.append(round(speed_mps, 3))
         if setpoints is not self._setpoints and setpoints != self._setpoints:
             self._setpoints = setpoints
@@ -303,18 +277,12 @@ class DriveRecorder(SessionRecorder):
         batch.said.extend(said)
         batch.last_s = time_s
         for change in interventions:
-            self._intervention(tick, time_s, change.rule, change.reason, change.before, change.after)
+            self._intervention(tick, time_s, change)
 
-    def _intervention(self, tick: int, time_s: float, rule: str, reason: str, before: Command, after: Command) -> None:
-        row = (
-            tick,
-            time_s,
-            reason,
-            (before.acceleration_mps2, before.steering_rad),
-            (after.acceleration_mps2, after.steering_rad),
-        )
-        rows = self._interventions.setdefault(rule, [])
-        rows.append(row)
+    def _intervention(self, tick: int, time_s: float, change: Intervention) -> None:
+        rule, before, after = change.rule, change.before, change.after
+        commands = [(one.acceleration_mps2, one.steering_rad) for one in (before, after)]
+        self._interventions.setdefault(rule, []).append((tick, time_s, change.reason, *commands))
         goes_on = self._intervened.get(rule) in (tick - 1, tick)
         self._intervened[rule] = tick
         if not goes_on:

@@ -165,15 +165,11 @@ def test_a_yes_to_the_cars_question_is_the_wish_it_offers() -> None:
     assert len(one.acted) == 1, "a second yes answers nothing"
 
 
-def test_a_no_drives_nothing() -> None:
+def test_a_no_drives_nothing_and_a_newer_question_takes_the_place_of_an_older_one() -> None:
     one = Asking()
     one.attention.offer(*ASKED)
     one.attention.confirm(False, Words("no"))
     assert (one.acted, one.notes, one.answered) == ([], [NOT_MEANT], 1)
-
-
-def test_a_newer_question_takes_the_place_of_an_older_one() -> None:
-    one = Asking()
     one.attention.offer(*ASKED)
     one.attention.offer("Shall I stop?", "Stop here.")
     one.attention.confirm(True, Words("yes"))

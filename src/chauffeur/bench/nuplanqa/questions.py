@@ -36,7 +36,7 @@ PREAMBLE: Final = (
 )
 """Word for word, its slip of the pen included: whatever was trained on the published questions has read it."""
 
-_SIGNALS: Final = re.compile(r"-\s*(Velocity|Steering)[^\[\n]*\[([^\]]*)\]", re.IGNORECASE)
+_SIGNALS: Final = re.compile(r"-\s*(Velocity|Steering)[^\[\n]{0,200}\[([^\[\]]*)\]", re.IGNORECASE)
 _OPTION: Final = re.compile(r"\(([a-d])\)\s{0,8}")
 _ANSWER: Final = re.compile(r"\s{0,8}\(([a-d])\)")
 

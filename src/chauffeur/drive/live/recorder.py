@@ -172,15 +172,9 @@ class LiveRecorder:
         self._levels[report.level] += 1
         at_s = report.tick * self._dt_s
         self._auditor.period(
-            report.tick,
-            at_s,
-            report.speed_mps,
-            report.setpoints,
-            report.requested,
-            report.applied,
-            report.state,
+            report.tick, at_s, report.speed_mps, report.setpoints, report.requested, report.applied, report.state,
             report.interventions,
-        )
+        )  # fmt: skip
         if report.taken_over != self._taken_over:
             self._taken_over = report.taken_over
             self._takeovers += report.taken_over
