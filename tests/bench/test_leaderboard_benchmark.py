@@ -162,7 +162,7 @@ def test_own_routes_are_the_same_every_time_and_lie_in_all_own_towns() -> None:
 def test_jobs_differ_by_all_that_decides_them() -> None:
     keys = set()
     for driver, density in (("expert", 1.0), ("reckless", 1.0), ("expert", 0.5)):
-        bench = LeaderboardBenchmark("own", driver=driver, density=density, seeds=2, limit=2)
+        bench = LeaderboardBenchmark("own", planner=driver, density=density, seeds=2, limit=2)
         keys |= {bench.job(item, None).key for item in bench.items()}
     assert len(keys) == 12
 
@@ -178,7 +178,7 @@ def test_seeds_are_counted_or_named(given: int | str, seeds: list[int]) -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {"driver": "nobody"},
+        {"planner": "nobody"},
         {"scenarios": "eleven"},
         {"seeds": 0},
         {"seeds": "11,11"},
