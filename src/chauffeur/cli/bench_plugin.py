@@ -35,7 +35,7 @@ _ABOUT: Final = {
     "nuplanqa": "Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none.",
     "openloop": "Waypoints over three seconds from a front picture, or over six with an instruction (paper Tab. XII).",
     "personalization": "Takeover rates of simulated passengers, without and with memory (paper Tab. VIII, IX, X).",
-    "realization": "Labelled commands, staged in a town or on a highway, driven by what was read, judged by the labels.",
+    "realization": "Labelled commands, staged, driven by what was read of them, and judged by the labels.",
 }
 """What our own are, without loading them: a list of commands must not import what they need."""
 
@@ -124,7 +124,8 @@ def _shared(
     """Declare what every benchmark's command takes beside its own options."""
 
 
-_OF_ASKING: Final = frozenset({"planner", "base_url", "concurrency", "max_usd", "max_requests", "price"})
+_BUDGET: Final = ("max_usd", "max_requests", "price")
+_OF_ASKING: Final = frozenset({"planner", "base_url", "concurrency", *_BUDGET})
 
 
 def own_options(make: Any) -> list[inspect.Parameter]:
@@ -209,8 +210,8 @@ def run_named(name: str, make: Any, own: Sequence[str], given: Mapping[str, Any]
     parts = [name, *([str(planner).replace("/", "-")] if planner else []), *([variant] if variant else [])]
     folder = given["out"] or Path("runs") / "-".join(parts)
     run = BenchRun(folder if part == WHOLE else folder / part.folder, bench, who, shard=part)
-    asking = [given[option] for option in ("max_usd", "max_requests", "price")] if bench.asks else [None, None, None]
-    work = effort(given["workers"], given.get("concurrency", 16), *asking, given["ray"])
+    asking = {option: given[option] for option in ("concurrency", *_BUDGET) if option in given}
+    work = effort(given["workers"], **asking, ray=given["ray"])
     rows = carry_out(console, run, lambda watch: run.run(watch, work), bench.id)
     if rows:
         show_tables(console, tables(bench.tables, rows))

@@ -1,4 +1,4 @@
-"""`chauffeur bench scenes frames` and `sft`: front pictures with motion, of our own traffic and out of nuScenes' files."""
+"""`chauffeur bench scenes frames` and `sft`: front pictures with motion, our own and nuScenes'."""
 
 from __future__ import annotations
 

@@ -223,7 +223,7 @@ questions about our own scenes are written by the generator that also makes the 
         """
         if control not in get_args(Control):
             raise ConfigError(f"There is no control {control!r}.", hint=f"Choose of: {', '.join(get_args(Control))}.")
-        self._control: Control = cast("Control", control)
+        self._control: Control = control
         self._count = {"multi": FRAMES, "single": 1}.get(str(frames)) or _number("frames", frames, 1, 20)
         self._shifts = tuple(range(4)) if shifts == "all" else (_number("shifts", shifts, 0, 3),)
         self._side = side
