@@ -11,6 +11,7 @@ import typer
 
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
+from chauffeur.concept import ConfigError
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
