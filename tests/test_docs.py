@@ -42,10 +42,10 @@ def _check(line: str, where: str) -> None:
         if word in children:
             command = children[word]
         elif children:
-            extra = command.get_command(typer.Context(command), word)  # a benchmark that is registered
-            if extra is None:
-                break  # what is no command where one is due is judged below
-            command = extra
+            try:
+                command = command.resolve_command(typer.Context(command), [word])[1]  # a registered benchmark
+            except Exception:  # what is no command where one is due is judged below
+                break
     known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
     rest = [word for word in words if word not in ("...", "|") and not word.startswith("-")]
     assert not getattr(command, "commands", {}) or command.name in rest[-1:] or not rest, where

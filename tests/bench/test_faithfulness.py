@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from chauffeur.bench.faithfulness import (
@@ -27,7 +26,7 @@ from chauffeur.bench.faithfulness.cases import ALIGNED, KINDS
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.report import fill
-from chauffeur.cli.bench_faithfulness import faithfulness
+from chauffeur.cli.main import app
 from chauffeur.programs import check_source
 from chauffeur.safety.faithfulness import FactSurroundings, read_facts
 
@@ -109,9 +108,7 @@ def test_scores_are_counted_right() -> None:
 
 
 def test_the_command_shows_and_saves(tmp_path: Path) -> None:
-    app = typer.Typer()
-    app.command()(faithfulness)
-    result = CliRunner().invoke(app, ["--items", "20", "--seed", "4", "--out", str(tmp_path)])
+    result = CliRunner().invoke(app, ["bench", "faithfulness", "--items", "20", "--seed", "4", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert "Generated (synthetic)" in result.output
     assert "Written by hand, test half" in result.output

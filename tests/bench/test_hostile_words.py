@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 from small_run import Inline, quiet
 from typer.testing import CliRunner
 
@@ -32,7 +31,7 @@ from chauffeur.bench.hostile.requests import SERVICE, HostileRequests
 from chauffeur.bench.hostile.rollout import MAX_S, describe_drive
 from chauffeur.bench.kernel.report import fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.cli.bench_hostile import hostile
+from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
@@ -298,11 +297,14 @@ def test_the_report_adds_up(tmp_path: Path) -> None:
 def test_the_command_shows_both_tables(tmp_path: Path) -> None:
     config = HostileConfig("keyword", a_kind=1)
     _rows(tmp_path / "run", config)  # the command finds all done
-    app = typer.Typer()
-    app.command()(hostile)
-    options = ["--planner", "keyword", "--items", "1", "--out", str(tmp_path / "run")]
+    options = ["bench", "hostile", "--planner", "keyword", "--items", "1", "--out", str(tmp_path / "run")]
     shown = CliRunner().invoke(app, options)
     assert shown.exit_code == 0, shown.output
     assert "Attacks" in shown.output and "Harmless wishes" in shown.output and "simulated" in shown.output
     assert (tmp_path / "run" / "table.md").read_text().startswith("# hostile-v1")
-    assert CliRunner().invoke(app, ["--planner", "obedient/sly", "--out", str(tmp_path / "x")]).exit_code != 0
+    assert (
+        CliRunner()
+        .invoke(app, ["bench", "hostile", "--planner", "obedient/sly", "--out", str(tmp_path / "x")])
+        .exit_code
+        != 0
+    )

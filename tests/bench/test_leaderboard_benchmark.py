@@ -160,9 +160,9 @@ def test_own_routes_are_the_same_every_time_and_lie_in_all_own_towns() -> None:
 
 
 def test_jobs_differ_by_all_that_decides_them() -> None:
-    onboard = {"driver": "onboard", "latency_s": 0.1}
+    onboard = {"planner": "onboard", "latency_s": 0.1}
     runs: tuple[dict[str, Any], ...] = (
-        {}, {"driver": "reckless"}, {"density": 0.5}, onboard, onboard | {"latency_s": 0.2},
+        {}, {"planner": "reckless"}, {"density": 0.5}, onboard, onboard | {"latency_s": 0.2},
         onboard | {"setting": "zero-shot"},
     )  # fmt: skip
     benches = [LeaderboardBenchmark("own", seeds=2, limit=2, **options) for options in runs]
@@ -180,10 +180,10 @@ def test_seeds_are_counted_or_named(given: int | str, seeds: list[int]) -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {"driver": "nobody"}, {"scenarios": "eleven"}, {"towns": "Atlantis"}, {"scoring": "lb9"}, {"density": -1.0},
+        {"planner": "nobody"}, {"scenarios": "eleven"}, {"towns": "Atlantis"}, {"scoring": "lb9"}, {"density": -1.0},
         {"seeds": 0}, {"seeds": "11,11"}, {"seeds": "-1"}, {"seeds": "a,b"}, {"seeds": ""},
-        {"driver": "onboard", "setting": "by-heart"}, {"driver": "onboard", "repository": "."},
-        {"driver": "onboard", "latency_s": -1.0},
+        {"planner": "onboard", "setting": "by-heart"}, {"planner": "onboard", "repository": "."},
+        {"planner": "onboard", "latency_s": -1.0},
     ],
 )  # fmt: skip
 def test_options_that_cannot_be_are_refused(options: dict[str, Any]) -> None:

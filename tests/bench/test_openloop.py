@@ -401,7 +401,9 @@ def test_the_command_asks_and_shows_the_papers_rows(tmp_path: Path) -> None:
     said = (tmp_path / "run" / "table.md").read_text()
     assert "paper: ViLaD-Opt" in said and "| constant velocity, openemma |" in said
     assert "read off the true future" in asked.output
-    written = CliRunner().invoke(app, [*arguments, "--write-sft", str(tmp_path / "sft.jsonl")])
-    assert written.exit_code == 0 and len((tmp_path / "sft.jsonl").read_text().splitlines()) == 2
+    written = CliRunner().invoke(app, ["bench", "scenes", "sft", arguments[3], "--out", str(tmp_path / "sft.jsonl")])
+    assert written.exit_code == 0, written.output
+    lines = (tmp_path / "sft.jsonl").read_text().splitlines()
+    assert len(lines) >= 2 and json.loads(lines[0])["messages"]
     nobody = CliRunner().invoke(app, arguments)
     assert nobody.exit_code != 0

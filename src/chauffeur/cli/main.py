@@ -11,12 +11,6 @@ import typer
 from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
-    bench_faithfulness,
-    bench_hostile,
-    bench_leaderboard,
-    bench_nuplanqa,
-    bench_openloop,
-    bench_personalization,
     camera,
     coach,
     coach_town,
@@ -32,6 +26,7 @@ from chauffeur.cli import (
     report,
     scenarios,
     scenes,
+    scenes_frames,
     talk,
     train,
     unmasking,
@@ -142,13 +137,8 @@ show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
-bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
-bench_app.command(epilog=bench_faithfulness.EXAMPLES)(bench_faithfulness.faithfulness)
-bench_app.command(epilog=bench_leaderboard.EXAMPLES)(bench_leaderboard.leaderboard)
-bench_app.command(epilog=bench_nuplanqa.EXAMPLES)(bench_nuplanqa.nuplanqa)
-bench_app.command(epilog=bench_openloop.EXAMPLES)(bench_openloop.openloop)
-bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
-scenes.scenes_app.command(epilog=bench_openloop.FRAMES_EXAMPLES)(bench_openloop.frames)
+scenes.scenes_app.command(epilog=scenes_frames.FRAMES_EXAMPLES)(scenes_frames.frames)
+scenes.scenes_app.command(epilog=scenes_frames.SFT_EXAMPLES)(scenes_frames.sft)
 bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
 
 app.add_typer(model_app, name="model", rich_help_panel=BUILD)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.bench.faithfulness.cases import ALIGNED, KINDS, FaithfulnessCase, half_of, handwritten
@@ -138,6 +139,11 @@ class FaithfulnessBenchmark(Unasked):
     def items(self) -> Sequence[FaithfulnessCase]:
         """See Benchmark. Raises DataError: the hand-written cases are damaged."""
         return self._cases
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes."""
+        del folder, rows, results
+        return ("A mismatch is what is looked for. Judged by reading alone; nothing was driven.",)
 
     def job(self, item: FaithfulnessCase, answer: Row | None) -> JudgeJob:
         del answer

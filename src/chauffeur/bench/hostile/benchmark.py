@@ -11,21 +11,23 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, Literal
 
 from chauffeur.bench.hostile.judge import RULER, served, verdict_of
 from chauffeur.bench.hostile.loader import Input, data_sha256, hostile_inputs, lookalikes, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner
-from chauffeur.bench.hostile.report import TABLES
+from chauffeur.bench.hostile.report import TABLES, headline
 from chauffeur.bench.hostile.requests import HostileRequests
 from chauffeur.bench.hostile.rollout import ROLLOUT_VERSION, DriveJob
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.passengers.scenes import SCENES as _STARTS
-from chauffeur.concept import Limits, Plan, PlanRequest, Scenario
+from chauffeur.concept import LAMPILOT_LIMITS, Limits, Plan, PlanRequest, Scenario
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
+from chauffeur.version import __version__
 
 _NAMES: Final = (
     "overtake", "cruise", "following", "left-lane", "emergency-lane", "intersection", "quiet-intersection",
@@ -142,6 +144,20 @@ class HostileRow:
     note: str = _SIMULATED
 
 
+def planner_of(spec: str, **options: Any) -> Planner:
+    """The planner a specification names: the suite's own `obedient`, or a registered one.
+
+    Raises:
+        ConfigError: Unknown, or an option it does not take.
+    """
+    name, _, argument = spec.partition("/")
+    if name == "obedient":
+        return ObedientPlanner(hostile_inputs(), argument)
+    from chauffeur.planners.registry import make_planner
+
+    return make_planner(spec, **options)
+
+
 class HostileBenchmark:
     """See the package."""
 
@@ -153,6 +169,7 @@ class HostileBenchmark:
         "What the simulator shows: speed, stops at signs, lanes, collisions. Shared: labels of attacks and of harmless "
         "wishes are one developer's; the limits are those of the checks and of the filter."
     )
+    planner_of = staticmethod(planner_of)
 
     def __init__(self, options: HostileConfig) -> None:
         """Make it. Raises DataError: the inputs are damaged."""
@@ -167,6 +184,23 @@ class HostileBenchmark:
 
     def items(self) -> Sequence[Input]:
         return self._inputs
+
+    @property
+    def variant(self) -> str:
+        """What the default run folder's name says of the options."""
+        ways = {"raw": not self.options.screened, "unshielded": not self.options.shield}
+        return "-".join(way for way, taken in ways.items() if taken)
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes."""
+        del folder, results
+        options, first = self.options, rows[0]
+        return (
+            headline(rows),
+            f"Chauffeur {__version__}; planner {first['planner']}, model {first['model']}; {self.id}; limits "
+            f"{options.limits.name}; words {'screened' if options.screened else 'raw'}; "
+            f"{'with' if options.shield else 'without'} the run-time shield; {first['note']}.",
+        )
 
     @cached_property
     def _requests(self) -> HostileRequests:
@@ -215,21 +249,24 @@ class HostileBenchmark:
 
 
 def hostile(
-    planner: str = "onboard", items: int = 0, seed: int = 42, setting: Setting = "few-shot"
+    planner: str = "onboard",
+    items: int = 0,
+    seed: int = 42,
+    setting: Setting = "few-shot",
+    screened: bool = True,
+    shield: bool = True,
+    limits: Literal["default", "lampilot"] = "default",
 ) -> HostileBenchmark:
-    """The benchmark, as its entry point gives it; arguments as in HostileConfig, `items` a class."""
-    return HostileBenchmark(HostileConfig(planner, setting, items, seed))
+    """Make the suite of 618 attacks in ten classes, and of 270 harmless wishes that look like them.
 
-
-def planner_of(spec: str, **options: Any) -> Planner:
-    """The planner a specification names: the suite's own `obedient`, or a registered one.
-
-    Raises:
-        ConfigError: Unknown, or an option it does not take.
+    Args:
+        planner: Any planner; or the suite's own `obedient` or `obedient/hidden`, which do what an attack says.
+        items: How many of each class, drawn with the seed; 0 for all.
+        seed: Seed of that draw.
+        setting: Prompt for language models.
+        screened: Whether words are screened on their way to the planner, or handed on raw.
+        shield: Whether the run-time shield has the last word, as in a drive.
+        limits: Bounds that no plan may cross.
     """
-    name, _, argument = spec.partition("/")
-    if name == "obedient":
-        return ObedientPlanner(hostile_inputs(), argument)
-    from chauffeur.planners.registry import make_planner
-
-    return make_planner(spec, **options)
+    bounds = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}[limits]
+    return HostileBenchmark(HostileConfig(planner, setting, items, seed, screened, bounds, shield))

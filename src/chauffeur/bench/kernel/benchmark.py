@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from chauffeur.bench.kernel.calls import Request
@@ -157,6 +158,21 @@ class ComparesRows(Protocol):
 
     def together(self, rows: Sequence[Row]) -> Sequence[Row]:
         """All rows of the run, as `rows` gave them, completed; as many, in the same order."""
+        ...
+
+
+@runtime_checkable
+class Concludes(Protocol):
+    """What a benchmark offers beyond that where more than its tables is to be said of a run."""
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """Lines beneath the tables; files of its own are written into the run's folder.
+
+        Args:
+            folder: The run's.
+            rows: All that were written.
+            results: What the jobs gave, by item.
+        """
         ...
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -18,7 +19,7 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.leaderboard.drivers import DRIVERS
 from chauffeur.bench.leaderboard.instructed import SETTINGS, PlannerSpec
 from chauffeur.bench.leaderboard.own_routes import own_routes
-from chauffeur.bench.leaderboard.results import NOT_DRIVEN, LeaderboardRow, counted, infractions_of
+from chauffeur.bench.leaderboard.results import NOT_DRIVEN, NOTE, LeaderboardRow, counted, infractions_of
 from chauffeur.bench.leaderboard.rollout import ROUTE_VERSION, RouteJob
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile, read_routes
 from chauffeur.bench.leaderboard.scoring import RouteScore, Scoring, driven_km, penalty, route_score
@@ -142,7 +143,7 @@ class LeaderboardBenchmark(Unasked):
         routes: str = "own",
         scenarios: str = "public",
         triggers: str = "",
-        driver: str = "expert",
+        planner: str = "expert",
         seeds: int | str = 3,
         density: float = 1.0,
         people: int = 0,
@@ -162,7 +163,7 @@ class LeaderboardBenchmark(Unasked):
             scenarios: `public` or `ten`: which trigger file is meant; `none` for empty roads' sake.
             triggers: Trigger file, or folder of them. By default looked for beside the route file, in
                 `../scenarios`; the own towns bring theirs.
-            driver: expert, reckless or standing; else a planner of the registry, which is told instructions.
+            planner: expert, reckless or standing; else a planner of the registry, which is told instructions.
             seeds: How often each route is driven, with seeds from 0 on; or the seeds themselves, with commas between
                 (`11,12`; `11,` for one).
             density: Factor of the background traffic.
@@ -180,7 +181,7 @@ class LeaderboardBenchmark(Unasked):
             ConfigError: An option that cannot be.
             DataError: A file is missing or malformed.
         """
-        planner = None if driver in DRIVERS else _planner_spec(driver, setting, repository, latency_s, base_url)
+        spec = None if planner in DRIVERS else _planner_spec(planner, setting, repository, latency_s, base_url)
         if scenarios not in ("public", "ten", "none"):
             raise ConfigError(f"There are no scenarios {scenarios!r}.", hint="Take public, ten or none.")
         self._seeds = _seeds(seeds)
@@ -188,11 +189,11 @@ class LeaderboardBenchmark(Unasked):
             raise ConfigError(f"A density of {density} makes no run.", hint="Take 0 or more.")
         penalty((), scoring)
         self._file, found = _files(routes, scenarios, triggers)
-        self._driver, self._density, self._people = driver, density, people
+        self._driver, self._density, self._people = planner, density, people
         self._scoring: Scoring = scoring
         self._scenarios, self._shield = scenarios, shield
-        self._planner = planner
-        self.setting = "" if planner is None else planner.setting
+        self._planner = spec
+        self.setting = "" if spec is None else spec.setting
         self._triggers: Mapping[str, tuple[Trigger, ...]] = found.towns
         wanted = {town.strip() for town in towns.split(",") if town.strip()}
         there = {one.town for one in self._file.routes}
@@ -209,7 +210,7 @@ class LeaderboardBenchmark(Unasked):
             "routes_sha256": self._file.sha256,
             "scenarios": scenarios,
             "triggers_sha256": found.sha256,
-            "driver": driver,
+            "driver": planner,
             "seeds": list(self._seeds),
             "density": density,
             "people": people,
@@ -218,7 +219,7 @@ class LeaderboardBenchmark(Unasked):
             "limit": limit,
             "shield": SHIELD_VERSION if shield else "",
             "version": ROUTE_VERSION,
-            **({} if planner is None else {"planner": list(planner.parts)}),
+            **({} if spec is None else {"planner": list(spec.parts)}),
         }
 
     @property
@@ -235,6 +236,19 @@ class LeaderboardBenchmark(Unasked):
 
     def items(self) -> Sequence[RouteItem]:
         return self._items
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes: writes the official results and a map of each route."""
+        undriven = Counter((row["infra_failed"], row["detail"]) for row in rows if row["engine"] == NOT_DRIVEN)
+        said = [
+            f"Not driven, {'not counted' if infra else 'counted as 0'}: {times} of {len(rows)}. {why}"
+            for (infra, why), times in undriven.most_common()
+        ]
+        from chauffeur.bench.leaderboard.artefacts import write_artefacts  # which draws what is made here
+
+        first, *maps = write_artefacts(folder, self, rows, results)
+        said.append(f"Official results: {first}; {len(maps)} route map{'' if len(maps) == 1 else 's'} beside it.")
+        return [*said, NOTE]
 
     def route_of(self, item: RouteItem) -> LeaderboardRoute:
         """The route of an item."""
@@ -354,8 +368,3 @@ def _files(routes: str, scenarios: str, triggers: str) -> tuple[RouteFile, Trigg
 
 def _route_hash(route: LeaderboardRoute) -> str:
     return hashlib.sha256(json.dumps(asdict(route), sort_keys=True).encode()).hexdigest()
-
-
-def leaderboard(**options: Any) -> LeaderboardBenchmark:
-    """The benchmark, as its entry point gives it: `LeaderboardBenchmark` tells the options."""
-    return LeaderboardBenchmark(**options)

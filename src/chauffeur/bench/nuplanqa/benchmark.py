@@ -175,12 +175,29 @@ class NuPlanQaBenchmark:
     judge = "The letter of the right option, as the file of questions has it. Shared: nothing, where it is NuPlanQA's; \
 questions about our own scenes are written by the generator that also makes the training data."
 
+    @property
+    def variant(self) -> str:
+        """What the default run folder's name says of the options."""
+        return "" if self._control == "pictures" else self._control
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes."""
+        del folder, results
+        said = [f"Left out: {what}" for what in self.unreadable]
+        if self._control != "text":
+            missing = self.frames.missing([one.token for one in self.questions if one.token in self.frames.metadata])
+            if missing:
+                said.append(f"{len(missing):,} pictures are not there, the first {missing[0]}.")
+        if any(str(row["scene"]).startswith("simulated") for row in rows):
+            said.append("The pictures are rendered and the questions generated: simulated, not nuPlan's.")
+        return said
+
     def __init__(
         self,
         data: str,
         images: str = "",
         metadata: str = "",
-        control: str = "pictures",
+        control: Control = "pictures",
         frames: str | int = "multi",
         cameras: str = ",".join(CAMERAS),
         shifts: str | int = 0,
@@ -206,7 +223,7 @@ questions about our own scenes are written by the generator that also makes the 
         """
         if control not in get_args(Control):
             raise ConfigError(f"There is no control {control!r}.", hint=f"Choose of: {', '.join(get_args(Control))}.")
-        self._control: Control = cast("Control", control)
+        self._control: Control = control
         self._count = {"multi": FRAMES, "single": 1}.get(str(frames)) or _number("frames", frames, 1, 20)
         self._shifts = tuple(range(4)) if shifts == "all" else (_number("shifts", shifts, 0, 3),)
         self._side = side

@@ -296,6 +296,22 @@ class OpenLoopBenchmark:
             "reading": READING,
         }
 
+    @property
+    def variant(self) -> str:
+        """What the default run folder's name says of the options."""
+        return "-".join(one for one in (self._setting, self._shown) if one not in ("zero-shot", "pictures"))
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes."""
+        del folder, rows, results
+        if self.own:
+            from chauffeur.bench.openloop.frames import (
+                SIMULATED,  # with cameras, which a run on nuScenes has no need of
+            )
+
+            return (SIMULATED,)
+        return ("Commands are read off the true future, as ST-P3 and UniAD do: no input a car would have.",)
+
     def asked_about(self, samples: Sequence[PlanningSample]) -> Sequence[PlanningSample]:
         """The samples that are asked about, of all that have 2 s before them."""
         return samples

@@ -22,6 +22,7 @@ import numpy as np
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, register, share
+from chauffeur.bench.kernel.run import write_results
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark, OpenLoopItem, OpenLoopStatus, read_answer
@@ -29,6 +30,7 @@ from chauffeur.bench.openloop.conventions import distances, standing
 from chauffeur.bench.openloop.doscenes import INSTRUCTION_KINDS, SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.nuscenes import PlanningSample
+from chauffeur.bench.openloop.requests import OpenLoopSetting, Shown
 from chauffeur.concept import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
 
 STEPS: Final = 12
 """Waypoints: 6 s."""
+_SHOWN: Final = 20
+"""Lines of what was left out on the console; all are in the run folder."""
 KEPT: Final = 0.975
 """Share of the scenes, those with the lowest ADE, in the challenge's means."""
 HISTORY_ONLY: Final = "history only"
@@ -222,6 +226,28 @@ class InstructedBenchmark(OpenLoopBenchmark):
             found.append(f"Malformed rows: {len(self.annotations.malformed)}.")
         return (*found, *self.annotations.malformed)
 
+    @property
+    def variant(self) -> str:
+        """What the default run folder's name says of the options."""
+        return "-".join(["instructed", *([super().variant] if super().variant else [])])
+
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes: writes `left_out.txt`, where anything was."""
+        del rows, results
+        from chauffeur.bench.openloop.frames import SIMULATED  # with cameras, which a run on nuScenes has no need of
+
+        said = list(self.left_out[:_SHOWN])
+        if len(self.left_out) > _SHOWN:
+            said.append(f"... and {len(self.left_out) - _SHOWN} more, in {folder / 'left_out.txt'}.")
+        if self.left_out:
+            write_results(folder, {"left_out.txt": "".join(f"{line}\n" for line in self.left_out)})
+        said.append(
+            "Gain: error without the instruction minus error with it, same model and scene. Annotators had seen the "
+            "whole scene: an instruction is privileged, and may be about what comes after the 6 s. No navigation is "
+            "shown."
+        )
+        return [*said, *([SIMULATED] if self.own else [])]
+
     def asked_about(self, samples: Sequence[PlanningSample]) -> Sequence[PlanningSample]:
         """The first sample of each annotated scene whose 6 s are known. Raises DataError: there is none."""
         found: dict[str, PlanningSample] = {}
@@ -320,3 +346,38 @@ def _errors(predicted: FloatArray, truth: FloatArray) -> tuple[float | None, flo
     """ADE and FDE of waypoints (STEPS, 2), m."""
     away = distances(predicted, truth)
     return round(float(away.mean()), 4), round(float(away[-1]), 4)
+
+
+def openloop(
+    data: str,
+    instructions: str = "",
+    tables: str = "",
+    setting: OpenLoopSetting = "zero-shot",
+    shown: Shown = "pictures",
+    scene_list: str = "",
+    side_px: int = 448,
+    limit: int = 0,
+    stride: int = 1,
+) -> OpenLoopBenchmark:
+    """Make the benchmark over 3 s, or with instructions the one over 6 s.
+
+    Args:
+        data: Folder with nuScenes' tables and `samples`.
+        instructions: doScenes' annotations (folder or file): 6 s ahead, with each instruction and without.
+        tables: E.g. v1.0-mini; default the only ones there.
+        setting: How it is asked.
+        shown: The real pictures, or grey ones.
+        scene_list: File with the names of scenes, one a line.
+        side_px: Longer side of the pictures in px; 0 as they are.
+        limit: Only the first so many frames; 0 for all.
+        stride: Only every so many-th frame.
+
+    Raises:
+        ConfigError: An option makes no sense.
+        DataError: Files cannot be read, or hold no frame that can be asked about.
+    """
+    options: dict[str, Any] = {
+        "version": tables, "setting": setting, "shown": shown, "scenes": scene_list, "side": side_px, "limit": limit,
+        "every": stride,
+    }  # fmt: skip
+    return InstructedBenchmark(data, instructions, **options) if instructions else OpenLoopBenchmark(data, **options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import (
     Any,
     Final,
@@ -15,7 +16,7 @@ from typing_extensions import TypedDict
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.personalization.figures import JUDGE, TABLES
+from chauffeur.bench.personalization.figures import JUDGE, TABLES, headline, latencies
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
@@ -23,6 +24,7 @@ from chauffeur.bench.personalization.study import BENCH_VERSION, StudyConfig, St
 from chauffeur.concept import ConfigError
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.registry import make_planner
+from chauffeur.version import __version__
 
 SIMULATED: Final = "simulated passengers in simulated drives; nobody was asked and nobody was driven"
 """Stands beside every figure."""
@@ -108,6 +110,17 @@ class StudyBenchmark(Unasked):
             for task in TASKS
         ]
 
+    def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
+        """See Concludes."""
+        del folder, results
+        p50, p95 = latencies(rows, "with")
+        return (
+            headline(rows),
+            f"Chauffeur {__version__}; planner {self.options.planner}, model {self.model}; {self.id}; "
+            f"{self.options.half} wordings; seed {self.options.seed}; from words to policy {1000 * p50:.0f} ms "
+            f"(median), {1000 * p95:.0f} ms (95 %). {self.judge}",
+        )
+
     def job(self, item: StudyJob, answer: Row | None) -> StudyJob:
         del answer
         return item
@@ -126,7 +139,22 @@ class StudyBenchmark(Unasked):
 
 
 def personalization(
-    passengers: int = 100, seed: int = 1, planner: str = "talk2drive", half: Half = "test", trips: int = 5
+    passengers: int = 100,
+    seed: int = 1,
+    planner: str = "talk2drive",
+    half: Half = "test",
+    trips: int = 5,
+    base_url: str | None = None,
 ) -> StudyBenchmark:
-    """The benchmark, as its entry point gives it; arguments as in StudyConfig."""
-    return StudyBenchmark(StudyConfig(passengers, seed, planner, half, trips))
+    """Make Talk2Drive's evaluation with simulated passengers.
+
+    Args:
+        passengers: How many simulated passengers.
+        seed: Seed of passengers, moods, words and order.
+        planner: Who plans without and with memory, e.g. `talk2drive` or `talk2drive/openai/MODEL`.
+        half: Wordings: `test`, or `tuning` to improve a planner.
+        trips: Trips the memory learns from, for each task.
+        base_url: OpenAI-compatible endpoint of the planner.
+    """
+    config = StudyConfig(passengers, seed, planner, half, trips)
+    return StudyBenchmark(config, None if base_url is None else {"base_url": base_url})
