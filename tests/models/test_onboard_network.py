@@ -266,11 +266,6 @@ def test_the_planner_plans_with_it(exported: Path) -> None:
     assert plan.usage.completion_tokens > 0
 
 
-def test_the_model_card_names_what_made_it(exported: Path) -> None:
-    about = json.loads((exported / "model.json").read_text())
-    assert about["version"] == "test"
-
-
 def test_it_writes_the_number_that_was_said(exported: Path) -> None:
     written = Engine(exported).write(prompt(None, (), "drive at 45 mph"), only_program=True)
     assert read_reply(written.text).steps == (DialectStep("drive_at", Number(45.0, "mph")),)
