@@ -10,7 +10,7 @@ import pytest
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.lampilot.rollout import plan_adapter
-from chauffeur.bench.motion import motion
+from chauffeur.bench.motion import MotionBenchmark
 from chauffeur.bench.motion.items import SKY, STYLES, commands, style_ranges
 from chauffeur.bench.motion.scoring import (
     WEIGHTS,
@@ -64,7 +64,7 @@ def test_there_are_ten_commands_a_manoeuvre_in_every_style() -> None:
         assert len(mine) == 10
         assert {one.style for one in mine} == set(STYLES)
         assert {one.directness for one in mine} == {1, 2, 3}
-    assert len(motion().items()) == 150
+    assert len(MotionBenchmark().items()) == 150
 
 
 def test_weights_of_equation_26_sum_to_one_and_a_worse_drive_scores_less() -> None:
@@ -79,7 +79,7 @@ def test_weights_of_equation_26_sum_to_one_and_a_worse_drive_scores_less() -> No
 
 
 def rows_for(gains: dict[str, ActionMatrix]) -> list[dict[str, Any]]:
-    bench, found = motion(), list[dict[str, Any]]()
+    bench, found = MotionBenchmark(), list[dict[str, Any]]()
     for item in bench.items()[:5]:
         plan = plan_adapter.dump_python(Plan(Thoughts(""), gains[item.weather], latency_s=0.5), mode="json")
         measured = asdict(DRIVE)
@@ -101,11 +101,11 @@ def test_gains_outside_the_box_align_with_nothing_and_what_crashed_scores_nothin
     outside = replace(SHARP, pid=(50.0, 0.0, 0.0))
     assert rows_for(dict.fromkeys(WEATHERS, outside))[0]["command_alignment"] == 0.0
     row = rows_for(dict.fromkeys(WEATHERS, CALM))[1] | {"outcome": "collision"}
-    assert motion().together([row])[0]["score"] == 0.0
+    assert MotionBenchmark().together([row])[0]["score"] == 0.0
 
 
 def test_a_drive_is_checked_driven_and_measured() -> None:
-    bench = motion()
+    bench = MotionBenchmark()
     item = next(one for one in bench.items() if one.id.startswith("lane_change"))
     job = bench.job(item, plan_adapter.dump_python(Plan(Thoughts(""), SHARP), mode="json"))
     assert job is not None
@@ -123,14 +123,14 @@ def test_a_drive_is_checked_driven_and_measured() -> None:
 def test_it_conforms_to_the_kernel() -> None:
     if "track" not in plugin_names("chauffeur.worlds"):
         pytest.skip("the installed package is older than its track; install it anew")
-    assert faults(motion()) == []
+    assert faults(MotionBenchmark()) == []
 
 
 def test_what_is_told_of_the_weather() -> None:
-    item = next(one for one in motion().items() if one.weather == "snow")
+    item = next(one for one in MotionBenchmark().items() if one.weather == "snow")
     context = Context("Here.", Situation("track", 0.0, 13.9, 2, 1, False, None, None))
     assert SKY["snow"] in item.told(context, "told").text
     assert not any(sky in item.told(context, "hidden").text for sky in SKY.values())
     assert SKY["sunny"] in item.told(context, "wrong").text
     with pytest.raises(ConfigError, match="unknown"):
-        motion(plant="tank")  # type: ignore[arg-type]
+        MotionBenchmark(plant="tank")  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from chauffeur.concept import Metric, Outcome
-from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, label, rehearse, tries
+from chauffeur.drive.rehearsal import RehearsedChoice, label, rehearse
 from chauffeur.programs import Sandbox
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
@@ -136,32 +136,6 @@ class Shared:
 
     def tell(self, worth: float) -> None:
         self.best = max(self.best, worth)
-
-
-def test_shares_put_together_choose_as_one_call_does(world: HighwayWorld, sandbox: Sandbox) -> None:
-    def judge(copy: HighwayWorld) -> NearTo:
-        return NearTo(copy, 20.0, patient=False)
-
-    def share(*places: int) -> dict[int, Rollout]:
-        return tries(world, SPEEDS, judge, places, sandbox=sandbox, max_s=10.0, board=board)
-
-    whole = rehearse(world, SPEEDS, judge, sandbox=sandbox, max_s=10.0)
-    board = Shared(-math.inf)
-    together = best_choice(SPEEDS, share(0) | share(1, 3) | share(2, 4))
-    assert together.index == whole.index
-    assert together.rollouts[whole.index] == whole.rollouts[whole.index]
-    assert board.best == whole.rollouts[whole.index].worth
-
-
-def test_a_try_is_broken_off_that_another_has_beaten(world: HighwayWorld, sandbox: Sandbox) -> None:
-    def judge(copy: HighwayWorld) -> NearTo:
-        return NearTo(copy, 20.0, patient=False)
-
-    alone = tries(world, SPEEDS, judge, (0,), sandbox=sandbox, max_s=10.0)[0]
-    beaten = tries(world, SPEEDS, judge, (0,), sandbox=sandbox, max_s=10.0, board=Shared(1e9))[0]
-    assert not alone.cut
-    assert beaten.cut
-    assert beaten.ticks < alone.ticks
 
 
 def test_nothing_to_rehearse_is_said(attempt: Try) -> None:

@@ -23,8 +23,5 @@ Price = Annotated[
 Processes = Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")]
 RunFolder = Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of everything.")]
-ShardPart = Annotated[
-    str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
-]
 WeightsSeed = Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")]
 Wishes = Annotated[list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")]

@@ -7,7 +7,7 @@ going to do. Whatever comes of it says so (`label`). Programs run in the sandbox
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol, Self, TypeVar
 
@@ -76,19 +76,6 @@ class Rollout:
         return self.worth == -math.inf
 
 
-class Board(Protocol):
-    """Where several who rehearse the same wish tell each other how good the best try is."""
-
-    @property
-    def best(self) -> float:
-        """What the best trip without a collision was worth, as far as told; -inf for none."""
-        ...
-
-    def tell(self, worth: float) -> None:
-        """A trip without a collision was worth so much."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class RehearsedChoice:
     """The best candidate.
@@ -135,48 +122,11 @@ def rehearse(
         ValueError: There are no candidates.
         SandboxError: No worker can be had.
     """
-    places = range(len(candidates))
-    rollouts = tries(
-        world, candidates, judge, places, sandbox=sandbox, max_s=max_s, library=library, stop_zone_m=stop_zone_m
-    )
-    return best_choice(candidates, rollouts)
-
-
-def tries(
-    world: SomeWorld,
-    candidates: Sequence[str],
-    judge: Callable[[SomeWorld], RehearsalJudge],
-    places: Iterable[int],
-    *,
-    sandbox: Sandbox,
-    max_s: float,
-    library: str = "",
-    stop_zone_m: float = STOP_ZONE_M,
-    board: Board | None = None,
-) -> dict[int, Rollout]:
-    """How some of the candidates do, by their places; as `rehearse`, for several who share the work.
-
-    Args:
-        world, candidates, judge, sandbox, max_s, library, stop_zone_m: As `rehearse`.
-        places: Which to try, in this order; each is asked for when the one before is done.
-        board: Where others who rehearse the same wish tell their best; None for nobody else.
-
-    Raises:
-        SandboxError: No worker can be had.
-    """
     rollouts: dict[int, Rollout] = {}
-    for place in places:
+    for place, source in enumerate(candidates):
         best = best_of(rollouts)
         rank = _NOTHING if best is None else _rank(rollouts[best], best)
-        rollout = _attempt(world, place, candidates[place], judge, rank, board, sandbox, max_s, library, stop_zone_m)
-        rollouts[place] = rollout
-        if board is not None and not (rollout.cut or rollout.collided):
-            board.tell(rollout.worth)
-    return rollouts
-
-
-def best_choice(candidates: Sequence[str], rollouts: Mapping[int, Rollout]) -> RehearsedChoice:
-    """The best of all that was tried. Raises ValueError when nothing was."""
+        rollouts[place] = _attempt(world, place, source, judge, rank, sandbox, max_s, library, stop_zone_m)
     best = best_of(rollouts)
     if best is None:
         raise ValueError("There is nothing to rehearse: no candidates.")
@@ -196,22 +146,17 @@ def _rank(rollout: Rollout, index: int) -> tuple[bool, bool, float, int]:
 class _Impatient:
     """A judge that ends a try which is lost, even if it came to no collision."""
 
-    def __init__(
-        self, judge: RehearsalJudge, best: tuple[bool, bool, float, int], index: int, board: Board | None
-    ) -> None:
+    def __init__(self, judge: RehearsalJudge, best: tuple[bool, bool, float, int], index: int) -> None:
         self._judge = judge
         self._best = best
         self._index = index
-        self._board = board
         self.cut = False
 
     def observe(self) -> None:
         self._judge.observe()
         if self._judge.over:
             return
-        ceiling = self._judge.ceiling
-        beaten = self._board is not None and ceiling < self._board.best
-        self.cut = beaten or self._best > (True, True, ceiling, -self._index)
+        self.cut = self._best > (True, True, self._judge.ceiling, -self._index)
 
     @property
     def over(self) -> bool:
@@ -238,7 +183,6 @@ def _attempt(
     source: str,
     make_judge: Callable[[SomeWorld], RehearsalJudge],
     best: tuple[bool, bool, float, int],
-    board: Board | None,
     sandbox: Sandbox,
     max_s: float,
     library: str,
@@ -246,7 +190,7 @@ def _attempt(
 ) -> Rollout:
     twin = world.copy()
     judge = make_judge(twin)
-    referee = _Impatient(judge, best, index, board)
+    referee = _Impatient(judge, best, index)
     executor = ProgramExecutor(sandbox=sandbox, library=library, gate=False, stop_zone_m=stop_zone_m)
     try:
         executor.start(source, twin)

@@ -12,7 +12,7 @@ from chauffeur.bench.lampilot.rollout import plan_adapter
 from chauffeur.concept import ConfigError, Frame, Parameters, Plan, Thoughts
 from chauffeur.describe.dispatch import describe
 from chauffeur.drive.session import make_world
-from chauffeur.models.vilad.benchmark import InstructionItem, drive_statistics, instructions
+from chauffeur.models.vilad.benchmark import InstructionBenchmark, InstructionItem, drive_statistics
 from chauffeur.planners.vilad.driving import reference
 from chauffeur.planners.vilad.driving_planning import trajectory_of
 
@@ -21,7 +21,7 @@ pytest.importorskip("osqp")
 
 
 def row_for(item: InstructionItem, plan: Plan) -> dict[str, Any]:
-    bench = instructions()
+    bench = InstructionBenchmark()
     answer = plan_adapter.dump_python(plan, mode="json")
     job = bench.job(item, answer)
     assert job is not None
@@ -29,18 +29,18 @@ def row_for(item: InstructionItem, plan: Plan) -> dict[str, Any]:
 
 
 def test_the_items_are_those_of_the_splits() -> None:
-    bench = instructions(count=3)
+    bench = InstructionBenchmark(count=3)
     items = bench.items()
     assert len(items) == 2 * 4 * 3
     assert len({one.id for one in items}) == len(items)
-    assert [one.text for one in instructions(count=3).items()] == [one.text for one in items]
-    assert {one.scenario.world for one in instructions("driving", "phrasing", 2).items()} == {"track"}
+    assert [one.text for one in InstructionBenchmark(count=3).items()] == [one.text for one in items]
+    assert {one.scenario.world for one in InstructionBenchmark("driving", "phrasing", 2).items()} == {"track"}
     with pytest.raises(ConfigError, match="unknown"):
-        instructions(task="flying")
+        InstructionBenchmark(task="flying")
 
 
 def test_a_drive_that_does_what_was_meant_succeeds_and_another_does_not() -> None:
-    items = instructions("driving", "seen", 12).items()
+    items = InstructionBenchmark("driving", "seen", 12).items()
     item = next(one for one in items if one.asked["halt"] == "stop" and one.asked["pace"] == "-")
     context = describe(make_world(item.scenario).reset(item.scenario))
     assert context.street is not None
@@ -60,7 +60,7 @@ def test_a_drive_that_does_what_was_meant_succeeds_and_another_does_not() -> Non
 def test_a_spot_that_is_as_good_as_any_is_a_success() -> None:
     from chauffeur.models.vilad.benchmark import _meant_spots
 
-    for item in instructions("parking", "seen", 6).items():
+    for item in InstructionBenchmark("parking", "seen", 6).items():
         world = make_world(item.scenario)
         meant = _meant_spots(world.reset(item.scenario), item.asked)
         if meant:

@@ -106,7 +106,13 @@ class MotionBenchmark:
     )  # fmt: skip
 
     def __init__(self, plant: Plant = "std", seed: int = 1, weather: Told = "told", camera: Shown = "off") -> None:
-        """Args: the plant; seed of its actuators' noise and of places; what planners hear of the weather, and see.
+        """Make it.
+
+        Args:
+            plant: The vehicle model.
+            seed: Of the actuators' noise and of places.
+            weather: What planners hear of the weather.
+            camera: What they see.
 
         Raises:
             ConfigError: There is no such plant, telling or camera.
@@ -217,11 +223,3 @@ def _matrix(policy: Mapping[str, Any] | None) -> ActionMatrix | None:
         return None
     (kp, ki, kd), (wl, wh, ws) = policy["pid"], policy["mpc"]
     return ActionMatrix((kp, ki, kd), (wl, wh, ws))
-
-
-def motion(plant: Plant = "std", seed: int = 1, weather: Told = "told", camera: Shown = "off") -> MotionBenchmark:
-    """Gains for three manoeuvres in five kinds of weather (paper Tab. XI): comfort, safety, alignment, latency.
-
-    Arguments as of MotionBenchmark.
-    """
-    return MotionBenchmark(plant, seed, weather, camera)

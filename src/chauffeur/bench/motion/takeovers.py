@@ -365,13 +365,3 @@ def _no_system(limits: Limits) -> SystemMessage:
     """S is the planner's own: it says how gains are to be given."""
     del limits
     return SystemMessage("")
-
-
-def motion_passengers(
-    planner: str = "vlm", passengers: int = 20, seed: int = 1, trips: int = 5, plant: Plant = "std"
-) -> TakeoverBenchmark:
-    """Takeovers of simulated passengers by directness and memory, with gains (paper Fig. 14-15).
-
-    Arguments as of TakeoverBenchmark.
-    """
-    return TakeoverBenchmark(planner, passengers, seed, trips, plant)

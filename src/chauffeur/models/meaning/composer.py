@@ -133,8 +133,6 @@ _STATES: Final[Mapping[str, Weights]] = {
     "vehicle": {"parked": 6, "moving": 2, "turning": 2, "oncoming": 3, "stopped": 2},
     "people": {"walking": 4, "standing": 3, "crossing": 4},
 }
-HINTED: Final[Weights] = {"speed": 5, "gap": 2, "stop": 1.5, "pull_over": 1, "wait": 0.5, "goto": 0.5, "go": 0.5}
-"""Acts that whole sentences hint at ("I'm late")."""
 _WAITED: Final[Weights] = {
     "until gone": 8, "until green": 3, "until clear": 4, "until arrives": 3, "until told": 3, "until opens": 1.5,
     "until moves": 1, "until other": 1,

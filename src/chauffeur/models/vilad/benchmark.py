@@ -323,7 +323,13 @@ class InstructionBenchmark:
     )  # fmt: skip
 
     def __init__(self, task: str = "both", split: str = "all", count: int = 300, seed: int = 2024) -> None:
-        """Args: `parking`, `driving` or `both`; a split or `all`; commands of each; seed of commands and scenes.
+        """Make it.
+
+        Args:
+            task: `parking`, `driving` or `both`.
+            split: One split of the commands, or `all`.
+            count: Commands of each task and split.
+            seed: Of commands and scenes.
 
         Raises:
             ConfigError: There is no such task or split.
@@ -393,11 +399,3 @@ class InstructionBenchmark:
                 metres=result.get("metres"),
             )
         ]
-
-
-def instructions(task: str = "both", split: str = "all", count: int = 300, seed: int = 2024) -> InstructionBenchmark:
-    """Commands driven closed loop: interactive parking and short drives (paper Tab. XIII).
-
-    Arguments as of InstructionBenchmark.
-    """
-    return InstructionBenchmark(task, split, count, seed)

@@ -160,7 +160,6 @@ _LASTING: Final = _any("remain", "keeps? standing", "stay there", "stays there",
 _VAGUE: Final = _any("few", "couple", "several", "some")
 _CLOSER: Final = _any(r"clos(?:e|er|ing)", "reduce", "shrink", "tighten", "shorten", "shorter", "smaller", "less")
 _WIDER: Final = _any("open", "grow", "increase", "back", "wider", "more", "larger", "longer")
-_FASTER: Final = _any("raise", "higher", r"accelerat(?:e|ing)", "up", "faster", "gain speed")
 _SLOWER: Final = _any("lower", r"slow\w*", "brake", "ease", "reduce", r"decelerat(?:e|ing)", "down", "drop")
 _REASON: Final = re.compile(
     r",? \b(?:because|since|so that|so it|in order to|to (?:avoid|save))\b.*$|\([^()]*\)",

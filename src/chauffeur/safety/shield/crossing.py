@@ -47,8 +47,6 @@ _BENT_M: Final = 0.1
 _JOINT_M: Final = 0.5
 _HALVINGS: Final = 8
 _SAME_M: Final = 1e-3
-_HELD_MPS2: Final = 0.3
-"""Accelerations closer than this are not told apart."""
 
 
 @dataclass(frozen=True, slots=True)
