@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import inspect
 import json
 import signal
 import subprocess
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from chauffeur.cli.bench_plugin import command_of
 from chauffeur.cli.main import app
+from chauffeur.concept.registry import load_plugin
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 
@@ -60,3 +63,31 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(data: Path, tmp_
     results = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
     assert len(results) == 6
     assert "paper: Human driver" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["faithfulness", "hostile", "leaderboard", "motion", "openloop", "personalization"])
+def test_the_options_of_a_benchmark_are_those_it_states(name: str) -> None:
+    """Each parameter of its class or function, with its default and the sentence of its docstring."""
+    make = load_plugin("chauffeur.benchmarks", name)
+    options = {one.name: one for one in command_of(name).params}
+    for parameter in inspect.signature(make).parameters.values():
+        option = options[parameter.name]
+        assert option.required == (parameter.default is inspect.Parameter.empty)
+        assert option.required or option.default == parameter.default
+        assert option.help, parameter.name
+    assert {"out", "workers", "shard", "ray"} <= set(options)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("bench faithfulness --bogus 1", "No such option"),
+        ("bench personalization --half other", "other"),
+        ("bench nuplanqa --planner keyword", "--data"),
+        ("bench leaderboard --seeds a,b", "no seeds"),
+        ("bench faithfulnes", "faithfulness"),
+    ],
+)
+def test_a_slip_in_an_option_is_said(line: str, said: str) -> None:
+    result = CliRunner().invoke(app, line.split())
+    assert result.exit_code == 2 and said in " ".join(result.output.split()), result.output

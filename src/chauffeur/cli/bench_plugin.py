@@ -6,6 +6,7 @@ point (`chauffeur.benchmarks`) names. How it is run is the same for all, and is 
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import os
 import re
@@ -52,6 +53,10 @@ class BenchGroup(TyperGroup):
         return command if command is not None or cmd_name not in plugin_names(GROUP) else _listed(cmd_name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
+            near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else "Run: chauffeur bench --help"
+            raise ConfigError(f"There is no benchmark {args[0]!r}.", hint=hint)
         name, command, rest = super().resolve_command(ctx, args)
         own = command is None or name is None or super().get_command(ctx, name) is not None
         return name, command if own else command_of(str(name)), rest

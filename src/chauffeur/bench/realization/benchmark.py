@@ -380,7 +380,7 @@ def _labelled(commands: Path) -> list[Row]:
             acts_from_json(cast("dict[str, Any]", row)["acts"])
             found.append({**cast("Row", row), "set": file.stem})
     if not found:
-        raise DataError(f"There are no labelled commands in {commands}.", hint="Give -o data=FOLDER.")
+        raise DataError(f"There are no labelled commands in {commands}.", hint="Give their folder: --data FOLDER.")
     return found
 
 
