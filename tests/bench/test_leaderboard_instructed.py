@@ -137,14 +137,14 @@ def test_the_car_does_not_wait_for_the_next_plan() -> None:
 def test_without_a_repository_the_programs_that_ship_are_offered(tmp_path: Path) -> None:
     half = (SNIPPETS / "policies.jsonl").read_text("utf-8").splitlines(keepends=True)[::2]
     (tmp_path / "policies.jsonl").write_text("".join(half), "utf-8")
-    shipped = LeaderboardBenchmark(driver="onboard", setting="human-feedback").config["planner"]
-    given = LeaderboardBenchmark(driver="onboard", setting="human-feedback", repository=str(tmp_path))
+    shipped = LeaderboardBenchmark(planner="onboard", setting="human-feedback").config["planner"]
+    given = LeaderboardBenchmark(planner="onboard", setting="human-feedback", repository=str(tmp_path))
     assert PolicyRepository(SNIPPETS).digest in shipped
     assert PolicyRepository(tmp_path).digest in given.config["planner"]
 
 
 def test_the_papers_rows_never_stand_alone_with_ours() -> None:
-    bench = LeaderboardBenchmark(driver="onboard", seeds=1, limit=1, latency_s=0.1)
+    bench = LeaderboardBenchmark(planner="onboard", seeds=1, limit=1, latency_s=0.1)
     item = bench.items()[0]
     result = replace(bench.job(item, None), route=replace(bench.route_of(item), fault="it is no route")).run()
     (row,) = bench.rows(ItemOutcome(item, None, "", json.loads(json.dumps(result))))

@@ -21,10 +21,10 @@ _MOVES: Final = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
 def until(process: subprocess.Popen[bytes], screen: int, words: str) -> str:
-    """What a process shows, without colours and moves, until it shows some words."""
+    """What a process shows, without colours and moves, until it shows some words, however its lines are broken."""
     shown = b""
     deadline_s = time.monotonic() + WITHIN_S
-    while words not in (plain := _MOVES.sub("", shown.decode(errors="replace"))):
+    while words not in " ".join((plain := _MOVES.sub("", shown.decode(errors="replace"))).split()):
         left_s = deadline_s - time.monotonic()
         assert left_s > 0.0, plain
         ready, _, _ = select.select([screen], [], [], min(left_s, _LOOK_S))
