@@ -49,7 +49,7 @@ def bench() -> None:
     """Benchmarks."""
 
 
-@bench_app.command(epilog=EXAMPLES)
+@bench_app.command(epilog=EXAMPLES, short_help="LaMPilot-Bench: instructions, driven (Tab. IV).")
 def lampilot(
     data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
     planner: Annotated[
@@ -135,7 +135,7 @@ def lampilot(
     finish(console, run)
 
 
-@bench_app.command(epilog=PASSENGER_EXAMPLES)
+@bench_app.command(epilog=PASSENGER_EXAMPLES, short_help="Hand-written wishes: driven, asked, or refused.")
 def passengers(
     planner: Annotated[str, typer.Option(help="As for `bench lampilot`.")] = "onboard",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
@@ -193,7 +193,7 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     )
 
 
-@bench_app.command(epilog=MERGE_EXAMPLES)
+@bench_app.command(epilog=MERGE_EXAMPLES, short_help="Put shards of a LaMPilot-Bench run together.")
 def merge(
     out: Annotated[Path, typer.Argument(help="Folder for the whole run.")],
     shards: Annotated[list[Path], typer.Argument(help="Folders of all its shards.")],

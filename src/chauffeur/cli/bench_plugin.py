@@ -27,18 +27,48 @@ from chauffeur.concept.registry import load_plugin, plugin_names
 GROUP = "chauffeur.benchmarks"
 _WHERE: Final = "Where it runs (changes no row)"
 _ABOUT: Final = {
-    "faithfulness": "Explanations and programs, aligned and not: precision, recall and false alarms of the judge.",
-    "hostile": "Hostile words: 618 attacks in ten classes, and 270 harmless wishes that look like them.",
-    "instructions": "Commands driven closed loop: interactive parking and short drives (paper Tab. XIII).",
-    "leaderboard": "CARLA Leaderboard 1.0 anywhere: RC, IP and DS over routes with traffic, lights and scenarios.",
-    "motion": "Gains for three manoeuvres in five kinds of weather: comfort, safety, alignment (paper Tab. XI).",
-    "motion-passengers": "Takeovers of simulated passengers by directness and memory, with gains (paper Fig. 14-15).",
-    "nuplanqa": "Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none.",
-    "openloop": "Waypoints over three seconds from a front picture, or over six with an instruction (paper Tab. XII).",
-    "personalization": "Takeover rates of simulated passengers, without and with memory (paper Tab. VIII, IX, X).",
-    "realization": "Labelled commands, staged, driven by what was read of them, and judged by the labels.",
+    "faithfulness": (
+        "Are explanations that misstate their program found?",
+        "Explanations and programs, aligned and not: precision, recall and false alarms of the judge.",
+    ),
+    "hostile": (
+        "Attacks by words, and wishes that look like them.",
+        "Hostile words: 618 attacks in ten classes, and 270 harmless wishes that look like them.",
+    ),
+    "instructions": (
+        "Commands to park and drive, closed loop (Tab. XIII).",
+        "Commands driven closed loop: interactive parking and short drives (paper Tab. XIII).",
+    ),
+    "leaderboard": (
+        "CARLA Leaderboard 1.0: RC, IP, DS (Tab. V).",
+        "CARLA Leaderboard 1.0 anywhere: RC, IP and DS over routes with traffic, lights and scenarios.",
+    ),
+    "motion": (
+        "Gains in five kinds of weather (Tab. XI).",
+        "Gains for three manoeuvres in five kinds of weather: comfort, safety, alignment (paper Tab. XI).",
+    ),
+    "motion-passengers": (
+        "Takeovers with gains, by memory (Fig. 14-15).",
+        "Takeovers of simulated passengers by directness and memory, with gains (paper Fig. 14-15).",
+    ),
+    "nuplanqa": (
+        "Questions about pictures of a road (Tab. VI).",
+        "Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none.",
+    ),
+    "openloop": (
+        "Waypoints from a front picture (Tab. XII, doScenes).",
+        "Waypoints over three seconds from a front picture, or over six with an instruction (paper Tab. XII).",
+    ),
+    "personalization": (
+        "Takeovers, without and with memory (Tab. VIII-X).",
+        "Takeover rates of simulated passengers, without and with memory (paper Tab. VIII, IX, X).",
+    ),
+    "realization": (
+        "Labelled commands, driven and judged by labels.",
+        "Labelled commands, staged, driven by what was read of them, and judged by the labels.",
+    ),
 }
-"""What our own are, without loading them: a list of commands must not import what they need."""
+"""What our own are, in a list and in their help, without loading them: a list must not import what they need."""
 
 
 class BenchGroup(TyperGroup):
@@ -65,8 +95,13 @@ class BenchGroup(TyperGroup):
 def _listed(name: str) -> Any:
     """A command as a list of commands shows it: the benchmark is not imported."""
     app = typer.Typer(add_completion=False)
-    app.command(name, help=_ABOUT.get(name) or f"The benchmark {name!r}, from an installed package.")(lambda: None)
+    app.command(name, help=_about(name)[0])(lambda: None)
     return typer.main.get_command(app)
+
+
+def _about(name: str) -> tuple[str, str]:
+    said = f"The benchmark {name!r}, from an installed package."
+    return _ABOUT.get(name, (said, said))
 
 
 def command_of(name: str) -> Any:
@@ -91,9 +126,9 @@ def command_of(name: str) -> Any:
     named = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in ordered]
     run.__signature__ = inspect.Signature(named)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *shared]}
-    about = _ABOUT.get(name) or _first_line(make) or f"The benchmark {name!r}, from an installed package."
+    about = _first_line(make) if name not in _ABOUT else _ABOUT[name][1]
     app = typer.Typer(rich_markup_mode="markdown", add_completion=False)
-    app.command(name, help=about, epilog=help_text_or_none(f"bench_{name}"))(run)
+    app.command(name, help=about or _about(name)[1], epilog=help_text_or_none(f"bench_{name}"))(run)
     return typer.main.get_command(app)
 
 

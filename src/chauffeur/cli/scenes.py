@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 scenes_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="Make, check and count scenes with instructions (LaMPilot's DbLv1 format).",
+    help="Make, check and count scenes with instructions.",
 )
 
 GENERATE_EXAMPLES = help_text("scenes GENERATE_EXAMPLES")
