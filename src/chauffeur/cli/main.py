@@ -136,7 +136,9 @@ show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
 bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
-bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(coach_town.coach_town)
+bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(
+    coach_town.coach_town
+)
 scenes.scenes_app.command(epilog=scenes_frames.FRAMES_EXAMPLES)(scenes_frames.frames)
 scenes.scenes_app.command(epilog=scenes_frames.SFT_EXAMPLES)(scenes_frames.sft)
 bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
