@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from functools import lru_cache
 
 _CONTRACTIONS = (
     (r"\bcan't\b|\bcannot\b|\bcant\b", "can not"),
@@ -59,6 +60,7 @@ def words_of(text: str) -> str:
     return _GAP.sub(" ", _OTHER_SIGNS.sub(" ", plain(text))).strip()
 
 
+@lru_cache(maxsize=256)  # a dozen readers look at the same few texts of a request
 def plain(text: str) -> str:
     """Lower case, straight quotes, no accents, contractions written out, hyphens and slashes opened."""
     text = unicodedata.normalize("NFKC", text).lower()
