@@ -69,14 +69,17 @@ class Tab:
     async def open(
         self, url: str, size: tuple[int, int] = TABLET, *, scheme: str = "light", calm: bool = False
     ) -> None:
-        """A page on a screen of this size, for a person with these preferences."""
+        """A page on a screen of this size, for a person with these preferences; its troubles are counted anew."""
+        await self.ask("Page.navigate", url="about:blank")  # the page before stops calling a server that has ended
+        await self.until("location.href === 'about:blank' && document.readyState === 'complete'")
+        self.troubles.clear()
         width, height = size
         await self.ask(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
-        await self.prefer(calm=calm)
+        await self.prefer(scheme=scheme, calm=calm)
         await self.ask("Page.navigate", url=url)
-        await self.until("document.readyState === 'complete'")
+        await self.until("location.href !== 'about:blank' && document.readyState === 'complete'")
 
     async def prefer(self, *, scheme: str = "light", calm: bool = False) -> None:
         """What the person prefers."""
