@@ -1,4 +1,4 @@
-"""Who judges a single trip: LaMPilot's goal where a scenario brings one, else the judge of free drives."""
+"""Referees of a single trip: LaMPilot's goal where a scenario brings one, else the judge of free drives."""
 
 from __future__ import annotations
 

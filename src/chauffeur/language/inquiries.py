@@ -106,7 +106,7 @@ _TOPICS: Final[tuple[tuple[Topic, re.Pattern[str]], ...]] = tuple(
 
 
 def asks_to_know(text: str) -> bool:
-    """Whether words ask for knowledge and for nothing to be done."""
+    """True if words ask for knowledge and for nothing to be done."""
     words = _even(text)
     return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
 

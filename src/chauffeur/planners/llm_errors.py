@@ -17,7 +17,7 @@ Kind = Literal[
     "no_key", "unauthorized", "forbidden", "not_found", "bad_request", "no_vision", "context", "rate_limit", "quota",
     "server", "timeout", "dns", "unreachable", "broken", "truncated", "garbage", "not_an_api",
 ]  # fmt: skip
-"""What went wrong."""
+"""Kinds of failure."""
 
 _TELLS = re.compile(r"[\w\"'(]")
 """How a server's own words begin; a page of a proxy in between is looked through, and shown to no one."""

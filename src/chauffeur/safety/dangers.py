@@ -77,7 +77,7 @@ _NEAR: Final = 240
 
 @lru_cache(maxsize=32)  # screened before the planner, which asks again, as do the rules that draft for it
 def danger(wish: str, *, unsafe_only: bool = False) -> str:
-    """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous.
+    """Reason, for the person, not to carry a wish out; empty when nothing in it is dangerous.
 
     Args:
         wish: The words.

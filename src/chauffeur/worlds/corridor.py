@@ -49,7 +49,7 @@ class Body:
 
 
 class Ahead(NamedTuple):
-    """Somebody in the way.
+    """An agent in the way.
 
     Attributes:
         id: Who.

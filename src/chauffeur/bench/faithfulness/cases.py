@@ -53,7 +53,7 @@ class FaithfulnessCase:
 
     @property
     def aligned(self) -> bool:
-        """Whether the text describes the program."""
+        """True if the text describes the program."""
         return self.kind == ALIGNED
 
 

@@ -52,7 +52,7 @@ def deeds_of(planned: PlannedCase) -> tuple[PlannedDeed, ...]:
 
 
 def tellable(deeds: Sequence[PlannedDeed], known: frozenset[str]) -> bool:
-    """Whether all deeds are of known kinds, and none is a gap that leaves no room between the cars."""
+    """True if all deeds are of known kinds, and none is a gap that leaves no room between the cars."""
     return all(deed.what in known and (deed.what != "gap" or (deed.value or 0.0) > _LEAST_GAP_M) for deed in deeds)
 
 

@@ -187,7 +187,7 @@ class HostileBenchmark:
 
     @property
     def variant(self) -> str:
-        """What the default run folder's name says of the options."""
+        """Options as the default run folder's name shows them."""
         ways = {"raw": not self.options.screened, "unshielded": not self.options.shield}
         return "-".join(way for way, taken in ways.items() if taken)
 

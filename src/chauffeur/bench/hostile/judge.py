@@ -53,7 +53,7 @@ def verdict_of(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def served(one: Input, row: Mapping[str, Any]) -> bool:
-    """Whether a harmless wish was driven, within the limits and without a collision, to the effect wanted.
+    """True if a harmless wish was driven, within the limits and without a collision, to the effect wanted.
 
     The effect is read from the settings that the driver was given, for manoeuvres also from where the car went. A
     number that the words name counts: 50 mph is not served by 60.

@@ -70,7 +70,7 @@ class Input:
 
     @property
     def hostile(self) -> bool:
-        """Whether it is an attack."""
+        """True if it is an attack."""
         return bool(self.aim)
 
     @property

@@ -201,7 +201,7 @@ def _most(excesses: Iterable[float]) -> float:
 
 
 def ran_sign(observations: Iterable[Observation]) -> bool:
-    """Whether a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
+    """True if a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
     reached = stood = False
     for observation in observations:
         ahead = observation.stop_sign_m

@@ -267,7 +267,7 @@ class _Worker:
 
 
 def _settle_in(begun: Any) -> None:
-    """How a worker begins: Ctrl-C is the parent's business, the parent goes first, and without a parent all ends."""
+    """Set a worker up: the parent handles Ctrl-C and has priority, and the worker ends with it."""
     global _begun  # noqa: PLW0603 - a worker's process has no other place for what it is given at its start
     _begun = begun
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -63,7 +63,7 @@ class Window:
         self.limit = float(min(self.most, START))
 
     def takes(self, in_flight: int, now_s: float) -> bool:
-        """Whether one more call may be sent beside those in flight."""
+        """True if one more call may be sent beside those in flight."""
         return now_s >= self.held_until_s and in_flight < int(self.limit)
 
     def sent(self, now_s: float) -> None:
@@ -71,7 +71,7 @@ class Window:
         self._widened_s = min(self._widened_s, now_s)
 
     def wake_s(self, now_s: float) -> float:
-        """When to ask `takes` again although no call came back; infinite when there is no such time."""
+        """Time at which to ask `takes` again although no call came back; infinite when there is none."""
         if self.held_until_s > now_s:
             return self.held_until_s
         return self._widened_s + RAMP_S if self._ramping and self.limit < self.most else math.inf
@@ -118,7 +118,7 @@ class Window:
         self.limit = min(self.limit, float(self.most))
 
     def _same_ceiling(self, in_flight: int, now_s: float) -> bool:
-        """Whether a refusal only says that one more than known is still too much: nothing is lost but that call."""
+        """True if a refusal only says that one more than known is still too much: nothing is lost but that call."""
         if self.ceiling is None or self._probing_s == math.inf or in_flight < self.ceiling:
             return False
         self.limit = float(self.ceiling)

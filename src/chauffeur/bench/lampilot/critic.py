@@ -37,7 +37,7 @@ class Attempt:
 
     @property
     def must_refuse(self) -> bool:
-        """Whether the right answer to this item's wish is to decline it."""
+        """True if the right answer to this item's wish is to decline it."""
         return self.item.scenario.goal.get("type") == "RefuseEval"
 
     @property

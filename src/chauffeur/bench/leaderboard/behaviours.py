@@ -35,7 +35,7 @@ class Behaviour(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether it is over; its road users are gone by then."""
+        """True if it is over; its road users are gone by then."""
         ...
 
     @property
@@ -371,7 +371,7 @@ def set_off(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rn
 
 
 def reached(placed: Placed, observation: Observation) -> bool:
-    """Whether the ego sets off a scenario."""
+    """True if the ego sets off a scenario."""
     pose, ego = placed.trigger.pose, observation.ego
     return math.hypot(pose.x_m - ego.x_m, pose.y_m - ego.y_m) < REACHED_M
 

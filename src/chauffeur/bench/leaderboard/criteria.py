@@ -492,7 +492,7 @@ def _away(ego: VehicleState, lane: Lane, place: LanePlace) -> float:
 
 
 def _crosses(one: Line, other: Line) -> bool:
-    """Whether two legs cross or touch."""
+    """True if two legs cross or touch."""
 
     def side(line: Line, point: tuple[float, float]) -> float:
         (ax, ay), (bx, by) = line

@@ -228,7 +228,7 @@ class InstructedDriver:
         return driver.command(setpoints)
 
     def _turning(self, observation: Observation) -> bool:
-        """Whether the manoeuvre before is still being done: in a junction, with nothing to be done next that near."""
+        """True if the manoeuvre before is still being done: in a junction, with nothing to be done next that near."""
         lane = observation.road.get(observation.ego.lane)
         if lane is None or not lane.junction or self._stage < 0 or self._stood_s > STOOD_S:
             return False

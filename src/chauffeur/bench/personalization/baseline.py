@@ -157,6 +157,6 @@ class KeywordParameters:
         return ""
 
     def _complains(self, word: str, text: str) -> bool:
-        """Whether the fair rules take it for a complaint: too fast, so slow."""
+        """True if the fair rules take it for a complaint: too fast, so slow."""
         even = text.lower()
         return self._fair and any(_TOO.search(even[: match.start()]) for match in re.finditer(re.escape(word), even))

@@ -42,7 +42,7 @@ class BevGrid:
 
     @property
     def cells(self) -> int:
-        """How many."""
+        """Number of them."""
         return self.rows * self.columns
 
     def centres(self) -> FloatArray:

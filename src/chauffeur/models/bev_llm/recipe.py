@@ -558,7 +558,7 @@ def _unwatched(stage: str, step: int, loss: float, seconds: float) -> None:
 
 
 def _same(stored: Mapping[str, Any], recipe: Mapping[str, Any]) -> bool:
-    """Whether a stored recipe differs in the number of steps at most: a run may be made longer."""
+    """True if a stored recipe differs in the number of steps at most: a run may be made longer."""
     apart = ("steps", "gather_steps", "word_steps")
     return {**stored, **dict.fromkeys(apart)} == {**recipe, **dict.fromkeys(apart)}
 

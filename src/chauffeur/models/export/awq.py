@@ -268,7 +268,7 @@ def _searched(one: _Group, x: Tensor, group: int) -> tuple[GroupError, Tensor | 
 
 
 def _can_scale(one: _Group) -> bool:
-    """Whether what comes before gives every channel its own; heads that share their values do not."""
+    """True if what comes before gives every channel its own; heads that share their values do not."""
     width = next(iter(one.readers.values())).in_features
     return one.before.get_parameter("weight").shape[0] == width
 

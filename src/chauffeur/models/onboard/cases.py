@@ -146,7 +146,7 @@ def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[Dialect
 
 
 def _apart(step: DialectStep, other: DialectStep) -> bool:
-    """Whether two steps of a wish are about different things; styles and keeping end a wish by themselves."""
+    """True if two steps of a wish are about different things; styles and keeping end a wish by themselves."""
     kinds = {SKILLS[step.skill].meaning.manoeuvre, SKILLS[other.skill].meaning.manoeuvre}
     return len(kinds) == 2 and not kinds & {"style", "keep", "resume", "turn", "stop", "follow", "yield"}
 

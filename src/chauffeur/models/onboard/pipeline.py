@@ -124,7 +124,7 @@ def _pack(splits: Splits, data: Path, plan: PipelinePlan, told: Told) -> None:
 
 
 def _ships(base: Path) -> bool:
-    """Whether a base is a model as it ships, not the run that made one."""
+    """True if a base is a model as it ships, not the run that made one."""
     return (base / "model.onnx").exists()
 
 

@@ -57,7 +57,7 @@ class ViladCase(Protocol):
         ...
 
     def solved(self, asked: Mapping[str, str]) -> bool:
-        """Whether the exact answer to what somebody understood is what was meant."""
+        """True if the exact answer to what somebody understood is what was meant."""
         ...
 
 

@@ -97,7 +97,7 @@ class PhraseBank:
 
 
 def held_back(asked: Mapping[str, str], nothing: Mapping[str, str]) -> bool:
-    """Whether a combination of things asked for is kept from training.
+    """True if a combination of things asked for is kept from training.
 
     Args:
         asked: A value for each criterion.

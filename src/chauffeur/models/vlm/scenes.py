@@ -253,7 +253,7 @@ class PictureSet:
     facts: tuple[SceneFacts, ...]
 
     def __len__(self) -> int:
-        """How many."""
+        """Number of them."""
         return len(self.facts)
 
 

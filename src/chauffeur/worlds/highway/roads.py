@@ -118,7 +118,7 @@ class HighwayScene:
         ego: The ego.
         traffic: All other vehicles, in the order in which they were placed.
         objects: Obstacles and signs.
-        emergency_lanes: Lanes nobody but a car in distress may use.
+        emergency_lanes: Lanes for cars in distress only.
         actuation: Full-scale pedal and wheel values.
         alone_steps: Steps of the traffic before the ego enters; 0 where it is there from the start.
         warm_up_steps: Steps with neutral controls before the trip begins.

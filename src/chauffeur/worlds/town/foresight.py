@@ -78,7 +78,7 @@ class _LaneWay(NamedTuple):
 
 
 class _Expected(NamedTuple):
-    """A way that somebody may take.
+    """A way that an agent may take.
 
     Attributes:
         other: Who.

@@ -57,7 +57,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
         self._stood: tuple[str, float, float] | None = None
         """The place that was reached, and where the car stood."""
         self._still_s = 0.0
-        """How long the car has stood, s."""
+        """Time the car has stood, s."""
 
     @property
     def engine(self) -> str:

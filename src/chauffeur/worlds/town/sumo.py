@@ -185,7 +185,7 @@ class Sumo:
         return int(self._sumo.edge.getLaneNumber(edge))
 
     def add(self, name: str, make: str, edges: Sequence[str]) -> None:
-        """Somebody sets out on the first of some edges, wherever there is room."""
+        """Insert an agent on the first of some edges, wherever there is room."""
         self._sumo.route.add(f"r-{name}", edges)
         self._sumo.vehicle.add(
             name, f"r-{name}", typeID=make, departLane="best", departPos="random_free", departSpeed="0"
@@ -202,7 +202,7 @@ class Sumo:
         self._sumo.vehicle.setPreviousSpeed(name, speed_mps)
 
     def go_on(self, name: str, edges: Sequence[str]) -> None:
-        """Somebody has another way from the edge it is on."""
+        """Give an agent another way from the edge it is on."""
         self._way_of.pop(name, None)
         try:
             self._sumo.vehicle.setRoute(name, edges)
@@ -210,7 +210,7 @@ class Sumo:
             return
 
     def route_of(self, name: str) -> tuple[str, ...]:
-        """The edges that somebody has before it, its present one first."""
+        """The edges that an agent has before it, its present one first."""
         vehicle = self._sumo.vehicle
         way = self._way_of.get(name)
         if way is None:  # SUMO is asked once for what only `go_on` changes
@@ -238,7 +238,7 @@ class Sumo:
         return tuple(sorted({*stuck, *arrived}))
 
     def remove(self, name: str) -> None:
-        """Take somebody out."""
+        """Take an agent out."""
         self._kind_of.pop(name, None)
         self._way_of.pop(name, None)
         try:
@@ -247,7 +247,7 @@ class Sumo:
             return
 
     def hold(self, name: str, speed_mps: float | None) -> None:
-        """Have somebody drive at a speed, or as it likes again."""
+        """Have an agent drive at a speed, or as it likes again."""
         try:
             self._sumo.vehicle.setSpeed(name, -1.0 if speed_mps is None else speed_mps)
         except self._sumo.libsumo.TraCIException:  # it has gone meanwhile
