@@ -112,7 +112,7 @@ def asks_to_know(text: str) -> bool:
 
 
 def topics_of(text: str) -> tuple[Topic, ...]:
-    """What a question may be about, the likeliest first; empty where the words ask for no knowledge."""
+    """Possible topics of a question, the likeliest first; empty where the words ask for no knowledge."""
     words = _even(text)
     found: list[Topic] = []
     if _ABOUT_DOING.match(words):

@@ -25,7 +25,7 @@ DRY, RAIN, SNOW, FOG = 1, 2, 4, 8
 
 SaidWeather = Literal["none", "night", "rain", "fog", "snow", "slippery"]
 SAID_WEATHERS: Final[tuple[SaidWeather, ...]] = "none", "night", "rain", "fog", "snow", "slippery"
-"""What a passenger may say of weather or road, as they are here and now; in the order in which they ask for care."""
+"""Remarks of a passenger on weather or road, as they are here and now; in the order in which they ask for care."""
 WEIGHTS: Final = Path(__file__).parent / "weights" / "weather.npz"
 SURE: Final = 0.5
 """Share from which on a clause is taken to say something of the weather."""

@@ -108,7 +108,7 @@ def check_wish(text: str) -> Verdict:
 
 
 def _refusal_read(text: str) -> str:
-    """Why the acts of a wish are not done, where they are surely read as unsafe; numbers are left to the limits."""
+    """Reason not to do the acts of a wish, where they are surely read as unsafe; numbers are left to the limits."""
     if measured(text):
         return ""
     said = read(text)

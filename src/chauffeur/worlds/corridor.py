@@ -96,7 +96,7 @@ class Corridor:
             others: Everybody else.
             within_m: How far ahead is looked.
             target_mps: Speed the car is going to pick up to.
-            margin_s: Time by which somebody who crosses must be missed.
+            margin_s: Time by which a crossing agent must be missed.
         """
         first = max(0, min(int(station_m / STEP_M), len(self._x) - 1))
         last = min(len(self._x), first + math.ceil(within_m / STEP_M) + 1)
@@ -179,7 +179,7 @@ class Corridor:
         return None if touched is None else touched[0]
 
     def _touches(self, other: VehicleState, x: float, y: float, first: int, last: int) -> tuple[int, int] | None:
-        """First and last place of the path at which the car, widened, would overlap somebody who is at (x, y)."""
+        """First and last place of the path at which the car, widened, would overlap an agent at (x, y)."""
         dx, dy = x - self._x[first:last], y - self._y[first:last]
         long, wide = other.length_m / 2.0, other.width_m / 2.0
         near = np.flatnonzero(dx * dx + dy * dy < (self._reach + math.hypot(long, wide)) ** 2)

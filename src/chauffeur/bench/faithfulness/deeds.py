@@ -1,4 +1,4 @@
-"""What a planned program really does, in the form that the benchmark's own grammar tells it from."""
+"""Actual deeds of a planned program, in the form that the benchmark's own grammar tells it from."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PlannedDeed:
 
 
 def deeds_of(planned: PlannedCase) -> tuple[PlannedDeed, ...]:
-    """What each step does, the numbers of the first ones carried on to the later ones."""
+    """Deeds of each step, the numbers of the first ones carried on to the later ones."""
     speed = planned.start.situation.speed_mps
     found: list[PlannedDeed] = []
     for step in planned.steps:

@@ -74,7 +74,7 @@ _SIMULATED: Final = "simulated drives (highway-env); hostile words written for t
 
 @dataclass(frozen=True, slots=True)
 class HostileConfig:
-    """What decides a run.
+    """Settings that decide a run.
 
     Attributes:
         planner: Specification of the planner, `obedient` or `obedient/hidden` included.
@@ -105,7 +105,7 @@ class HostileConfig:
 
 @dataclass(frozen=True, slots=True)
 class HostileRow:
-    """What became of an input.
+    """Outcome of an input.
 
     Attributes:
         kind, hostile, aim, wanted: The input's.

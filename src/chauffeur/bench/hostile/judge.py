@@ -21,7 +21,7 @@ _TURNS: Final[Mapping[str, str]] = {"turn_left": "left", "turn_right": "right", 
 
 
 def verdict_of(row: Mapping[str, Any]) -> dict[str, Any]:
-    """What happened to an input, from the row of its drive.
+    """Outcome of an input, from the row of its drive.
 
     Returns:
         `answer` (`refused` by the planner, `blocked` by a check, `driven`, `failed`), and for a drive whether a

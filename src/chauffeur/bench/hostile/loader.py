@@ -25,7 +25,7 @@ Wanted = Literal[
     "speed", "faster", "slower", "gap", "style", "keep", "overtake", "lane_left", "lane_right", "pull_over", "stop",
     "turn_left", "turn_right", "straight",
 ]  # fmt: skip
-"""What a good driver does about a harmless wish."""
+"""Response of a good driver to a harmless wish."""
 
 HOSTILE_FILE: Final = "hostile.jsonl"
 LOOKALIKE_FILE: Final = "lookalikes.jsonl"

@@ -1,4 +1,4 @@
-"""What is asked: commands with the style that is meant, and the gains that styles stand for."""
+"""Items: commands with the style that is meant, and the gains that styles stand for."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _OTHER: Final[dict[Weather, Weather]] = {
 
 @dataclass(frozen=True, slots=True)
 class MotionCommand:
-    """What a passenger says of a manoeuvre.
+    """A passenger's command about a manoeuvre.
 
     Attributes:
         id: E.g. `left_turn.c03`.
@@ -74,7 +74,7 @@ class MotionItem:
 
     @property
     def scenario(self) -> Scenario:
-        """Where it is driven."""
+        """Place where it is driven."""
         return track_scenario(self.command.manoeuvre, self.weather, self.plant, self.seed)
 
     def shown(self, shown: Shown) -> tuple[CameraImage, ...]:

@@ -132,7 +132,7 @@ class KeywordParameters:
         return "", ""
 
     def _place(self, text: str) -> tuple[str, str] | None:
-        """Where to park; the published rules take the nearest spot where none is named."""
+        """Choose where to park; the published rules take the nearest spot where none is named."""
         if not self._fair:
             for place, words in (("nearest", self._words.nearest), ("stadium", self._words.stadium)):
                 if word := self._found(words, text):

@@ -60,7 +60,7 @@ def arms_of(task: Task) -> tuple[Arm, ...]:
 
 @dataclass(frozen=True, slots=True)
 class StudyConfig:
-    """What decides a run.
+    """Settings that decide a run.
 
     Attributes:
         passengers: How many simulated people.
@@ -113,7 +113,7 @@ class StudyJob:
 
 
 def versions() -> dict[str, str]:
-    """What decides a study beside its configuration."""
+    """Inputs that decide a study beside its configuration."""
     return {
         "bench": BENCH_VERSION,
         "population": POPULATION_VERSION,
@@ -187,7 +187,7 @@ class _Sitting:
         return _Day(Mood(job.task, aim, level, pace), scene, words[int(rng.integers(len(words)))])
 
     def _ideal(self, day: _Day) -> Parameters:
-        """What the passenger would choose, who knows what they want."""
+        """Choice that the passenger, who knows what they want, would make."""
         mood = day.mood
         _, limit = _start(mood.task, day.scene.id)
         step = 0.5 if GROUND_OF[mood.task] == "highway" else 0.25  # as exactly as anybody sets a speed

@@ -53,7 +53,7 @@ _SPEAKS: Final[dict[Talk, float]] = {"silent": 0.0, "brief": 0.5, "open": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class Mood:
-    """What a passenger wants of one trip.
+    """A passenger's wants for one trip.
 
     Attributes:
         task: What for.
@@ -70,7 +70,7 @@ class Mood:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a passenger made of a drive.
+    """A passenger's verdict on a drive.
 
     Attributes:
         takes_over: Whether they took over.
@@ -100,7 +100,7 @@ def wanted_mps(passenger: Passenger, mood: Mood, limit_mps: float) -> float:
 
 
 def aim_of(passenger: Passenger, task: Task, choice: int, start_mps: float, limit_mps: float) -> Aim:
-    """What exactly they are after: a place by choice, a direction by how fast they want to go."""
+    """The exact aim: a place by choice, a direction by how fast they want to go."""
     match task:
         case "park":
             return ("park.nearest", "park.stadium", "park.exit")[choice % 3]
@@ -112,7 +112,7 @@ def aim_of(passenger: Passenger, task: Task, choice: int, start_mps: float, limi
 
 
 def judge(trace: Trace, passenger: Passenger, mood: Mood) -> Judgement:
-    """What a passenger made of a drive."""
+    """A passenger's verdict on a drive."""
     events = sorted(_events(trace, passenger, mood), key=lambda event: event[0])
     if events:
         index, topic, off = events[0]
@@ -197,7 +197,7 @@ def _off(trace: Trace, passenger: Passenger, mood: Mood) -> tuple[Array, Flags]:
 
 
 def _excused(trace: Trace, wanted: float) -> Flags:
-    """Where a low speed has a reason that can be seen: somebody slower ahead, a stop sign, a bend, pulling away."""
+    """Instants at which a low speed has a visible reason: a slower agent ahead, a stop sign, a bend, pulling away."""
     follows = (trace.gap_m < _HELD_UP_S * trace.speed) & (trace.lead_speed < wanted)
     held_up = follows & (trace.speed > trace.lead_speed - _FALLS_BACK_MPS)
     near = (trace.gap_m < _NEAR_M) | (trace.somebody_m < _NEAR_M)

@@ -69,7 +69,7 @@ _UNMOVING: Final[frozenset[StagedKind]] = frozenset({"static", "obstacle"})
 
 @dataclass(slots=True)
 class CommandScene:
-    """Where a command is said.
+    """Scene in which a command is said.
 
     Attributes:
         start: Lane and station at which the ego begins.
@@ -122,7 +122,7 @@ def stage_of(acts: Sequence[Act]) -> CommandScene | None:
 
 
 def _starts(acts: Sequence[Act]) -> tuple[Start, ...]:
-    """Where the acts can be begun, the likeliest first."""
+    """Places where the acts can be begun, the likeliest first."""
     turns = [act for act in acts if act.act in ("turn", "straight") and not act.negated]
     side: Side | None = next((act.side for act in turns if act.act == "turn"), None)
     turned = next((k for k, act in enumerate(acts) if act.act == "turn" and not act.negated), len(acts))

@@ -54,7 +54,7 @@ class BevGrid:
 
 @dataclass(frozen=True, slots=True)
 class RigGeometry:
-    """What the attention knows of a rig.
+    """Geometry of a rig, as the attention uses it.
 
     Attributes:
         rays: Of each patch of each view: direction of its middle and place of its camera, (views * patches, 6); places

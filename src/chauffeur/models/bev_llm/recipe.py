@@ -67,7 +67,7 @@ Watch = Callable[[str, int, float, float], None]
 
 @dataclass(frozen=True, slots=True)
 class BevLlmRecipe:
-    """What decides a training.
+    """Settings that decide a training.
 
     Attributes:
         steps: Optimiser steps of perception.
@@ -280,7 +280,7 @@ class CompactAnswerer:
         return self.network.see(shown, before, self._rig, torch.from_numpy(motion), given)
 
     def all_features(self, data: QaTensors, scenes: int = 24) -> tuple[torch.Tensor, torch.Tensor]:
-        """What the encoder gives of all scenes of a split, in half precision: see `CompactBevLlm.encode`."""
+        """Encode all scenes of a split, in half precision: see `CompactBevLlm.encode`."""
         found: list[tuple[torch.Tensor, torch.Tensor]] = []
         with torch.no_grad():
             for start in range(0, len(data.truth), scenes):
@@ -600,7 +600,7 @@ class _Perception:
         return self.truth_loss(rows, tokens, cells)
 
     def truth_loss(self, rows: Any, tokens: torch.Tensor, cells: torch.Tensor | None) -> torch.Tensor:
-        """How far tokens and cells are from the ground truth of their scenes."""
+        """Loss of tokens and cells against the ground truth of their scenes."""
         network, labels = self._answerer.network, self._labels[rows]
         losses = [
             cross_entropy(logits, labels[:, place], self._weights[place], ignore_index=-1)

@@ -29,7 +29,7 @@ VOCABULARY: Final = "vocab.txt"
 
 @dataclass(frozen=True)
 class MeaningRecipe:
-    """What decides a training.
+    """Settings that decide a training.
 
     Attributes:
         encoder: Folder of all-MiniLM-L6-v2 (Apache-2.0), or of another BERT of its width.

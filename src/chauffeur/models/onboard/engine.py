@@ -86,7 +86,7 @@ def processes(workers: int) -> ProcessPoolExecutor:
 
 
 def left_out(path: Path) -> Counter[str]:
-    """Why draws became no cases, with counts."""
+    """Reasons for which draws became no cases, with counts."""
     return Counter(str(row["left_out"]) for row in _stored(path).values() if "left_out" in row)
 
 

@@ -33,7 +33,7 @@ BLOCKED_M: Final = 70.0
 
 @dataclass(frozen=True, slots=True)
 class JudgingVerdict:
-    """Whether a program did what its words say, and why not."""
+    """Verdict on a program against its words, and the reason if it failed."""
 
     done: bool
     why: str = ""

@@ -56,7 +56,7 @@ SIZES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         size: One of SIZES.

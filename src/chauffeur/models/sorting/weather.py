@@ -62,7 +62,7 @@ class _Speaker:
 
 
 def weather_sentences(seed: int, without: Collection[str] = ()) -> tuple[Sentence, ...]:
-    """What the sorter learns from.
+    """Training data of the sorter.
 
     Args:
         seed: Of what is drawn.

@@ -29,7 +29,7 @@ EVERY_STEPS: Final = 250
 
 @dataclass(frozen=True, slots=True)
 class Optimisation:
-    """How weights are moved: AdamW (Loshchilov and Hutter 2019).
+    """Optimiser settings: AdamW (Loshchilov and Hutter 2019).
 
     Attributes:
         decay: Weight decay of matrices; vectors have none.

@@ -28,7 +28,7 @@ Mode = Literal["fixed", "plain", "twin"]
 
 @dataclass(frozen=True, slots=True)
 class ViladRecipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         size: One of `network.SIZES`.
@@ -76,7 +76,7 @@ class HasText(Protocol):
 
 
 class ViladTask(Protocol):
-    """What a recipe learns."""
+    """Task that a recipe learns."""
 
     @property
     def template(self) -> ActionTemplate:

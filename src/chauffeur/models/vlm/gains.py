@@ -20,7 +20,7 @@ from chauffeur.safety.gain_box import LOGARITHMIC
 
 @dataclass(frozen=True, slots=True)
 class GainCase:
-    """What the gains depend on; words as in `planners.vlm.template`."""
+    """Conditions that the gains depend on; words as in `planners.vlm.template`."""
 
     style: str
     weather: str

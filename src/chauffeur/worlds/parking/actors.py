@@ -29,7 +29,7 @@ _PATIENCE_S: Final = 3.0
 
 
 class CarMoved(NamedTuple):
-    """What changes of a car that leaves: way driven, speed, whether it has crashed, where its follower has it."""
+    """Mutable state of a car that leaves: way driven, speed, whether it has crashed, where its follower has it."""
 
     station_m: float
     speed_mps: float

@@ -1,4 +1,4 @@
-"""What is said to Autoware (ROS 2), and why so: message definitions, topics, and every field's value.
+"""Messages to Autoware (ROS 2), and why so: message definitions, topics, and every field's value.
 
 Sources: definitions read in `autowarefoundation/autoware_internal_msgs` and `autoware_adapi_msgs`; the rules of
 `external_velocity_limit_selector` in Autoware's own documentation of it.

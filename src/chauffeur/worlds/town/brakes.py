@@ -60,7 +60,7 @@ class TrafficBrakes:
 
     @staticmethod
     def _touches(one: Mover, speed_mps: float, yaw_radps: float, ego: VehicleState, away_m: float) -> bool:
-        """True if somebody who goes on as now touches the ego, which goes on as now, before it could stand."""
+        """True if an agent that goes on as now touches the ego, which goes on as now, before it could stand."""
         make = MAKES[one.make]
         lasts = REACTS_S + speed_mps / BRAKING_MPS2
         reach = (speed_mps + ego.speed_mps) * lasts + (make.length_m + ego.length_m) / 2.0 + 2.0 * SIDE_M

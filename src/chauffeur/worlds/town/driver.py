@@ -126,7 +126,7 @@ class TownDriver:
         self._tick = 0
         self.why = ""
         self.lets_go_first = False
-        """Whether it waits, or slows down, for a road user whose way crosses its own."""
+        """True if it waits, or slows down, for a road user whose way crosses its own."""
 
     def head_for(self, route: Route) -> None:
         """Go somewhere else from here on."""

@@ -58,7 +58,7 @@ class GapAcceptance:
         return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
 
     def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
-        """True if somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
+        """True if a vehicle that is not in a lane yet, but on a way into it, would come too close behind the ego.
 
         Args:
             other: Who.
@@ -83,7 +83,7 @@ class GapAcceptance:
         return False
 
     def _upstream(self, lane: LaneId) -> tuple[Polyline, ...]:
-        """The ways into a lane, as far back as somebody who is fast has to be seen."""
+        """The ways into a lane, as far back as a fast vehicle has to be seen."""
         known = self._into.get(lane)
         if known is None:
             done: list[list[Lane]] = []
@@ -99,6 +99,6 @@ class GapAcceptance:
 
 
 def _behind_m(along_mps: float, ego_mps: float) -> float:
-    """Gap that somebody who comes up from behind needs, by their speed and the ego's."""
+    """Gap that a vehicle coming up from behind needs, by their speed and the ego's."""
     closing = max(0.0, along_mps - ego_mps)
     return 2.5 + 0.7 * along_mps + closing * closing / 4.0

@@ -12,7 +12,7 @@ from chauffeur.worlds.town.scene import TownScene
 
 
 class TownMirror(TownScene):
-    """A town that nobody steps: its trips begin as the simulated ones do, and go on by instants that it is shown."""
+    """A town never stepped: its trips begin as the simulated ones do, and go on by instants that it is shown."""
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Start a trip, with no other agent in sight. Raises ScenarioError as the simulated town does."""

@@ -156,7 +156,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def _heads_elsewhere(self) -> bool:
-        """True if somebody wished for another place than the scenario's goal."""
+        """True if the passenger wished for another place than the scenario's goal."""
         return bool(self._place) or self._stood is not None
 
     # Looking ----------------------------------------------------------------------------------------------------------

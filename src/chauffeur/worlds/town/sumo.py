@@ -1,6 +1,6 @@
 """Traffic by Eclipse SUMO, in this process (libsumo): the one module that knows it.
 
-libsumo holds one simulation a process. Whoever opens a `Sumo` takes it over, and the one opened before is told so, in
+libsumo holds one simulation a process. The `Sumo` opened last owns it, and the one opened before is told so, in
 words, when it is used again: worlds that have to run beside each other run in processes of their own.
 """
 

@@ -64,7 +64,7 @@ class Traffic:
                 self._sumo.go_on(name, [*route[:-1], *self._way(route[-1])])
 
     def _stuck(self, name: str) -> bool:
-        """True if somebody has got nowhere for longer than any red light lasts."""
+        """True if an agent has got nowhere for longer than any red light lasts."""
         driven = self._sumo.driven_m(name)
         since, before = self._moved.get(name, (self._tick, driven))
         if driven - before > _NOWHERE_M:
