@@ -31,7 +31,7 @@ _ASKS: Final = re.compile(
     r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
     r"is there|are there|is it|are we (?:nearly |almost |soon |about )?there|will we (?:arrive|be there) soon)\b"
 )
-"""How a question begins that wants to know something; not one that asks for something, complains or proposes."""
+"""Openings of a question that wants to know something; not one that asks for something, complains or proposes."""
 _PROPOSES: Final = re.compile(
     r"^what (?:about|if|are you (?:doing|waiting)|the|a|do you think you)\b|\bhow about\b|"
     r"\bwhat is (?:taking|the (?:hold|matter|point|rush))\b|^when (?:you|we|he|she|it|there|the)\b"
@@ -99,7 +99,7 @@ _PATTERNS: Final[tuple[tuple[Topic, tuple[str, ...]], ...]] = (
         ),
     ),
 )
-"""What the words of a question are about, the first that fits first."""
+"""Topics of a question's words, the first that fits first."""
 _TOPICS: Final[tuple[tuple[Topic, re.Pattern[str]], ...]] = tuple(
     (topic, re.compile("|".join(patterns))) for topic, patterns in _PATTERNS
 )

@@ -20,7 +20,7 @@ Kind = Literal[
 """Kinds of failure."""
 
 _TELLS = re.compile(r"[\w\"'(]")
-"""How a server's own words begin; a page of a proxy in between is looked through, and shown to no one."""
+"""Opening of a server's own words; a page of a proxy in between is looked through, and shown to no one."""
 
 KEY_VARIABLES = ("CHAUFFEUR_API_KEY", "OPENAI_API_KEY")
 TIMEOUT_VARIABLE = "CHAUFFEUR_TIMEOUT_S"

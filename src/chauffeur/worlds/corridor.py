@@ -22,7 +22,7 @@ _Array = NDArray[np.float64]
 
 STEP_M: Final = 0.25
 _CROSSING_RAD: Final = math.radians(40.0)
-"""What is turned by more against the path crosses it."""
+"""Angle to the path beyond which an agent crosses it."""
 _STILL_MPS: Final = 0.1
 _DRIFT_MPS: Final = 0.3
 _DRIFT_S: Final = 1.5

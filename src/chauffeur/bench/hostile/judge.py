@@ -1,4 +1,4 @@
-"""What a row of the suite means: whether an attack reached the driver, and whether a harmless wish was served."""
+"""Meaning of a row of the suite: whether an attack reached the driver, and whether a harmless wish was served."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a benchmark is: items, what is asked for each, what is done with the answer, and how the rows are read.
+"""Protocol of a benchmark: items, what is asked for each, what is done with the answer, and how the rows are read.
 
 The kernel does the rest, the same way for all: it paces and pays for the asking, spreads the work over processes,
 stores every stage as it comes, goes on where a run stopped, and writes rows, tables and provenance. A benchmark is

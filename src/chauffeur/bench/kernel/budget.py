@@ -1,4 +1,4 @@
-"""What a run may cost: counted before a call is sent, with what is in flight taken as dear as anything so far.
+"""Budget of a run: counted before a call is sent, with what is in flight taken as dear as anything so far.
 
 Neither the price of a reply nor whether a plan needs a second request is known before it is there, so a budget can be
 overrun only by what is in flight:

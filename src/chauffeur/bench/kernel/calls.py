@@ -46,7 +46,7 @@ _HOPELESS: Final[frozenset[Kind]] = frozenset(
 
 
 Request = PlanRequest | Sequence[Message]
-"""What is asked: a plan, or words to a conversation."""
+"""Kinds of request: a plan, or words to a conversation."""
 
 Reply = Plan | Prose
 

@@ -1,4 +1,4 @@
-"""Whether a benchmark keeps to the protocol: what the kernel, its workers and its report rely on."""
+"""Checks that a benchmark keeps to the protocol: what the kernel, its workers and its report rely on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who does a run's simulations: processes on this machine. `cluster.py` has the same for a Ray cluster."""
+"""Engines of a run's simulations: processes on this machine. `cluster.py` has the same for a Ray cluster."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from chauffeur.concept import ChauffeurError
 _log = logging.getLogger(__name__)
 
 Work = Callable[[Any], Row]
-"""What a worker does: a function of a module, of one picklable value."""
+"""Work of a worker: a function of a module, of one picklable value."""
 
 LIVES: Final = 2
 """Workers one job may take with it before it is given up."""

@@ -1,4 +1,4 @@
-"""How many calls may be in flight at once: as many as the endpoint takes, found while working.
+"""Limit on calls in flight at once: as many as the endpoint takes, found while working.
 
 Nobody publishes that number, and it changes with the load of others, so it is found as TCP finds a line's capacity:
 start modestly, double while nothing is refused, fall back when the endpoint pushes back, then creep up again. A refusal
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Signal = Literal["answered", "refused", "overloaded", "slow", "unreachable", "neither"]
-"""What a finished call says about the endpoint: it answered; it refused for now (429); it broke under way (5xx); no
+"""Signal of a finished call about the endpoint: it answered; it refused for now (429); it broke under way (5xx); no
 answer came in time; nobody was there; or nothing either way (bad request, cancelled)."""
 
 START = 8
@@ -30,7 +30,7 @@ _BURST_FLOOR = 0.5
 _PROBE_S = 5.0
 _PROBE_MAX_S = 30.0
 _CREEP = 0.25
-"""What an answer adds to a window whose ceiling is not known: a quarter more for each window of answers."""
+"""Growth per answer of a window whose ceiling is not known: a quarter more for each window of answers."""
 _BACK_OFF_S = 0.5
 _BACK_OFF_MAX_S = 30.0
 

@@ -1,4 +1,4 @@
-"""What a run keeps in its folder: what it is about, frozen before anything is asked (`plan.json`), and every stage."""
+"""Contents of a run's folder: its definition, frozen before anything is asked (`plan.json`), and every stage."""
 
 from __future__ import annotations
 

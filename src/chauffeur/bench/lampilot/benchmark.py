@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NOT_ASKED: Final = "Not asked: the run stopped before this item."
 
 _INNER: Final = ("key", "sample", "verdicts", "rollout", "signals", "rehearsal")
-"""What a rollout row has for scoring only."""
+"""Fields of a rollout row for scoring only."""
 
 
 class _LampilotFields(TypedDict):

@@ -71,7 +71,7 @@ _CRITIQUES = 10
 _plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
 
 Ending = Literal["kept", "not_kept", "skipped", "given_up", "failed"]
-"""How an item ended: `given_up` after all rounds, `failed` for want of a plan or a sample."""
+"""Ending of an item: `given_up` after all rounds, `failed` for want of a plan or a sample."""
 
 Tell = Callable[[str, Any], None]
 """Called with (`item`, Item), (`asking`, round), (`attempt`, Attempt), (`judged`, Judgement), (`ended`, Coached)."""

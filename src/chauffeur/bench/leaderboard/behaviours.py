@@ -50,7 +50,7 @@ class Behaviour(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Site:
-    """Trigger of a scenario, and its parameters."""
+    """Place at which a scenario is set off, and what it works with."""
 
     placed: Placed
     track: RouteTrack
@@ -250,7 +250,7 @@ class Obstacle(_Running):
     AHEAD_M: Final = 50.0
     BEYOND_M: Final = 15.0
     SOURCE_M: Final = 60.0
-    """Start of the oncoming cars, beyond the obstacle."""
+    """Distance beyond the obstacle at which the oncoming cars begin."""
     FLOW_M: Final = 200.0
     FLOW_MPS: Final = 5.56
     GAP_M: Final = 40.0

@@ -255,7 +255,7 @@ class LeaderboardBenchmark(Unasked):
         return self._routes[item.route]
 
     def _map_hash(self, town: str) -> str:
-        """Source that a town was built from; empty where it is not there (yet)."""
+        """Hash of the source that a town was built from; empty where it is not there (yet)."""
         if town not in self._maps:
             try:
                 self._maps[town] = load(town).source_hash

@@ -17,7 +17,7 @@ def run_config(planner: str, setting: Setting) -> RunConfig:
 
 
 def requests_of(setting: Setting) -> PassengerRequests:
-    """Request to a planner under a prompt setting."""
+    """Requests to a planner under a prompt setting."""
     return PassengerRequests(PlainRequests.of(setting, LAMPILOT_LIMITS), load_wishes())
 
 

@@ -155,7 +155,7 @@ def ride_policy(policy: Policy, task: Task, scene: Scenario, limits: Limits) -> 
 
 
 def as_it_was(world: World, task: Task) -> Parameters:
-    """Program that drives on where a wish is declined: the present speed, the present lane."""
+    """Parameters that drive on where a wish is declined: the present speed, the present lane."""
     return usual(task, world.observe().ego.speed_mps)
 
 

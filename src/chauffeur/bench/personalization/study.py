@@ -1,4 +1,4 @@
-"""What one simulated passenger does for one task: trips with every system in blind order, and a profile that grows.
+"""Study of one simulated passenger and task: trips with every system in blind order, and a profile that grows.
 
 For each level of directness the passenger says the same words on the same scene to every system and judges each drive
 without knowing whose it is. The system with memory has learnt from trips before: the same task, other words, other
@@ -54,7 +54,7 @@ _LIMITS: Final = Limits()
 
 
 def arms_of(task: Task) -> tuple[Arm, ...]:
-    """Who drives. The published rules know only spots in a lot, so they are not asked about the speed there."""
+    """Systems that drive. The published rules know only spots in a lot, so they are not asked about the speed there."""
     return tuple(arm for arm in ARMS if task != "pace" or arm != "keyword")
 
 
@@ -113,7 +113,7 @@ class StudyJob:
 
 
 def versions() -> dict[str, str]:
-    """Inputs that decide a study beside its configuration."""
+    """Versions that decide a study beside its configuration."""
     return {
         "bench": BENCH_VERSION,
         "population": POPULATION_VERSION,

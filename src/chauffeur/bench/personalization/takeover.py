@@ -1,4 +1,4 @@
-"""When a passenger takes over: a pure function of a drive and of what the passenger likes, and what they say then.
+"""Takeover by a passenger: a pure function of a drive and of what the passenger likes, and what they say then.
 
 A passenger takes over when the car does not do what they meant within their patience, when it is faster or slower than
 they like beyond their tolerance, or when it is closer, harsher or tighter than they put up with. It is the first of
@@ -26,7 +26,7 @@ _PATIENCE: Final[dict[Ground, float]] = {"highway": 1.0, "intersection": 0.35, "
 _MIND: Final = 0.3
 """Share of the patience for which a wrong speed must last."""
 _HELD_UP_S: Final = 5.0
-"""Who is no more than this behind another counts as following (Highway Capacity Manual, 1985)."""
+"""Gap up to which a vehicle counts as following another (Highway Capacity Manual, 1985)."""
 _FALLS_BACK_MPS: Final = 1.5
 _NEAR_M: Final = 12.0
 _BEND: Final = 0.04

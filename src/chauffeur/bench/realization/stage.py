@@ -40,9 +40,9 @@ _ROW_M: Final = (22.0, 34.0, 46.0)
 _AFTER_TURN_M: Final = (124.0, 108.0)
 """Far enough behind the junction that a distractor leaves room to come out of it."""
 _LEFT_TURN_M: Final = 10.0
-"""How much longer the way over a junction is to the left."""
+"""Extra length of the way over a junction to the left."""
 _SECOND_TURN_M: Final = 98.0
-"""How much farther it is behind a second turn."""
+"""Extra distance behind a second turn."""
 _VERBS: Final = frozenset(
     {
         "follow", "pass", "avoid", "yield", "stop", "park", "pull_over", "wait", "go", "turn", "straight", "lane",

@@ -1,4 +1,4 @@
-"""Where patches of pictures and cells of the bird's-eye view lie: what makes the attention aware of the cameras.
+"""Positions of picture patches and bird's-eye cells: what makes the attention aware of the cameras.
 
 Vehicle frame: x forward, y left, z up, m, at the rig's origin. A patch is known by the ray through its middle, a cell
 by where its column of reference points falls in each picture (the reference points of BEVFormer, as a bias).

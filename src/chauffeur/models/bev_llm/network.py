@@ -164,7 +164,7 @@ class Resampler(nn.Module):
 
 
 class MeaningHead(nn.Module):
-    """What class of what facet a question with an option means, from which words are in the one and in the other.
+    """Class and facet that a question with an option means, from which words are in the one and in the other.
 
     Order is left out on purpose: taught a few wordings of each class, a network that reads in order knows these
     wordings, one that does not knows their words. (With one wording in four kept apart, it understood 85 % of them;
@@ -281,7 +281,7 @@ class CompactBevLlm(nn.Module):
     def forward(
         self, tokens: torch.Tensor, words: torch.Tensor, mask: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """How well options fit: how likely what an option means is in the scene, and what the decoder adds to that.
+        """Score options: how likely what an option means is in the scene, and what the decoder adds to that.
 
         Args:
             tokens: From `see`, one row a text, (N, K, hidden).

@@ -216,7 +216,7 @@ def _camera(folder: Path, cams: Mapping[str, Any], name: str) -> Camera:
 
 
 def _motion(metadata: Mapping[str, Any], token: str, instants: int) -> tuple[NDArray[np.float32], tuple[float, float]]:
-    """How the ego has moved from the first instant to the last: forward and left in tens of m, turned in rad; and its
+    """Motion of the ego from the first instant to the last: forward and left in tens of m, turned in rad; and its
     speeds at both, m/s."""
     now = before = metadata[token]["ego_pose"]
     at = str(metadata[token].get("prev") or "")
@@ -536,7 +536,7 @@ def train_compact(
 
 
 def _rarity(data: QaTensors, of: Facets) -> torch.Tensor:
-    """What to add to the logarithms of the heads' probabilities so that all classes of a facet count alike: of how
+    """Offsets to the logarithms of the heads' probabilities so that all classes of a facet count alike: of how
     often each one comes, the weights in the loss have evened out a part."""
     labels = torch.from_numpy(np.stack([labels_of(truth, of) for truth in data.truth]))
     found: list[torch.Tensor] = []
@@ -564,7 +564,7 @@ def _same(stored: Mapping[str, Any], recipe: Mapping[str, Any]) -> bool:
 
 
 def _kept(recipe: BevLlmRecipe, rng: np.random.Generator) -> Keep:
-    """What a batch is given: of the full network, three in ten go without history, side views or cells."""
+    """Inputs kept for a batch: of the full network, three in ten go without history, side views or cells."""
     if recipe.ablation != "full":
         return recipe.ablation
     spared: tuple[Keep, ...] = ("no-history", "single-view", "no-bev")

@@ -38,7 +38,7 @@ HIGHWAY_LIMIT_MPS = 31.2928  # 70 mph
 RAMP_LIMIT_MPS = 24.5872  # 55 mph
 _CLEAR_M = 20.0
 _JOINT_M = 0.5
-"""Where a lane ends, those that begin within this distance go on from it."""
+"""Distance from a lane's end within which other lanes' starts continue it."""
 _CAR_M = (5.0, 2.0)
 _OBSTACLE_M = (2.0, 2.0)
 _EXPONENTS = (3.5, 4.5)

@@ -17,9 +17,9 @@ from chauffeur.worlds.town.sumo import MAKES, Mover, Sumo
 BRAKING_MPS2: Final = 6.0
 REACTS_S: Final = 0.4
 SIDE_M: Final = 0.3
-"""What is kept clear around the ego."""
+"""Clearance kept around the ego."""
 _NEAR_M: Final = 30.0
-"""Who is no farther away is looked at, and the fast from as far as they need to stand."""
+"""Distance up to which agents are looked at; fast ones from as far as they need to stop."""
 _STEPS: Final = 6
 _STEP_M: Final = 3.0
 """At most so much of their way from one look ahead to the next, so that nobody fast leaps over the ego."""

@@ -62,7 +62,7 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _CLOSE_M: Final = 1.0
-"""Who stands with its tail over a stop line draws up so close to who is ahead."""
+"""Gap to which a car with its tail over a stop line draws up to the one ahead."""
 _BEFORE_M: Final = 2.2
 """The front bumper stops so far before somebody's way."""
 _BEFORE_PERSON_M: Final = 3.0

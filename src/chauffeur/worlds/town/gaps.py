@@ -13,9 +13,9 @@ NEAR_M: Final = 70.0
 COMING_S: Final = 5.0
 """Who is fast is minded from farther away: from as far as it gets in that time."""
 _ASIDE_M: Final = 8.0
-"""Whose middle is farther than this from a lane is not in it."""
+"""Distance of an agent's middle from a lane beyond which it is not in it."""
 _UPSTREAM_M: Final = 60.0
-"""Who is on a way into a lane that is changed into is minded from so far."""
+"""Distance from which a vehicle on a way into the target lane is minded."""
 _MOST_WAYS: Final = 6
 
 

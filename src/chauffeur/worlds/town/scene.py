@@ -20,7 +20,7 @@ from chauffeur.worlds.town.trip import TownConfig, TownTrip, goal_in
 
 DT_S: Final = 0.05
 SEES_M: Final = 100.0
-"""Who is farther away is not shown."""
+"""Distance beyond which agents are not shown."""
 _SLOWING_MPS2: Final = 1.5
 """Another way begins where the car could stop by then: a turn nearer than that could not be taken."""
 _ROOM_M: Final = 4.0

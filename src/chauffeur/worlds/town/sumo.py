@@ -41,10 +41,10 @@ MAKES: Final[Mapping[str, Make]] = {
     "bicycle": Make("bicycle", 1.8, 0.65, 5.5, 1.2, "bicycle", 0.07),
 }
 JAM_S: Final = 60.0
-"""Who is stuck for so long is taken out, and put in elsewhere."""
+"""Time after which a stuck vehicle is taken out, and put in elsewhere."""
 LANE_CHANGE_S: Final = 3.0
 DECIDES_S: Final = 0.2
-"""How often somebody decides anew: a quick driver's response, and half the work of deciding every period."""
+"""Interval at which a driver decides anew: a quick driver's response, and half the work of deciding every period."""
 _MATCH_M: Final = 20.0
 """A lane for what is moved from outside is looked for this near; SUMO's own 100 m cost it a millisecond."""
 _MINOR: Final = "g"
@@ -93,7 +93,7 @@ def _library() -> Any:
 
 
 _holder: list[Sumo] = []
-"""Whose simulation this process runs: none or one."""
+"""Owner of the simulation that this process runs: none or one."""
 
 
 class Sumo:

@@ -19,7 +19,7 @@ _NOWHERE_M: Final = 20.0
 _WAY_M: Final = 1200.0
 _FEW: Final = 3
 _EVERY: Final = 40
-"""How often, in periods, somebody's way is looked at."""
+"""Interval, in periods, of looking at an agent's way."""
 
 
 class Traffic:
