@@ -31,7 +31,7 @@ _LOOK_S: Final = 7.0
 _EVERY_S: Final = 0.5
 _CROSSES_WITHIN_M: Final = 45.0
 _PICKING_UP_MPS2: Final = 1.5
-"""How the car is taken to speed up when it is asked who crosses ahead of it."""
+"""Acceleration assumed of the car when it is asked which agents cross ahead of it."""
 
 
 @dataclass(frozen=True, slots=True)

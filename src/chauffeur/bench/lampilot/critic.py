@@ -220,7 +220,7 @@ def _overtake(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
 
 
 def _lane_words(side: str, seen: SeenCommands) -> tuple[str, ...]:
-    """Obstacle that kept the ego out of the lane beside its first one; empty when it was there in the end."""
+    """Sentences on why the ego was not in the lane beside its first one; empty when it was there in the end."""
     sign = 1 if side == "right" else -1
     if seen.side == sign:
         return ()

@@ -26,7 +26,7 @@ _PATIENCE: Final[dict[Ground, float]] = {"highway": 1.0, "intersection": 0.35, "
 _MIND: Final = 0.3
 """Share of the patience for which a wrong speed must last."""
 _HELD_UP_S: Final = 5.0
-"""Gap up to which a vehicle counts as following another (Highway Capacity Manual, 1985)."""
+"""Time gap up to which a vehicle counts as following another (Highway Capacity Manual, 1985)."""
 _FALLS_BACK_MPS: Final = 1.5
 _NEAR_M: Final = 12.0
 _BEND: Final = 0.04

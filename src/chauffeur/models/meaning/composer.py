@@ -60,7 +60,7 @@ PLACED: Final[Mapping[str, tuple[float, Weights]]] = {
     "u_turn": (0.35, {"at": 5, "here": 2, "after": 1, "next": 2}),
     "exit": (0.3, {"at": 2, "next": 2}),
 }  # fmt: skip
-"""How often an act names a place, and which relation."""
+"""Frequencies with which an act names a place, and which relation."""
 _WAYS: Final[Weights] = {
     "junction": 26, "light": 6, "stop_sign": 4, "roundabout": 3, "end_of_road": 3, "crosswalk": 2, "road": 3, "sign": 1,
     "building": 2, "driveway": 1,

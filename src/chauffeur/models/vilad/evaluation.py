@@ -1,4 +1,4 @@
-"""How well commands are done: success with and without verification, what was understood, consistency, passes, latency;
+"""Metrics of an evaluation: success with and without verification, what was understood, consistency, passes, latency;
 and the linear reader with the exact solver beside it."""
 
 from __future__ import annotations

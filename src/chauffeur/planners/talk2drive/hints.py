@@ -43,7 +43,7 @@ _SIDES: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 calm, however the likelihood of the first is split."""
 
 _WANTS_NOTHING: Final = 2.0
-"""How much more `none` counts against whole sides: it has nothing that speaks for it, and who chats is to be left in
+"""Extra weight of `none` against whole sides: it has nothing that speaks for it, and who chats is to be left in
 peace."""
 
 _ALIKE: Final = {

@@ -17,7 +17,7 @@ _RESPONSE_S: Final = 0.5
 _BRAKING_MPS2: Final = 4.0
 """What the rear one brakes with, half a second on; the front one goes on as it does. IDM's comfortable braking."""
 _ALONG: Final = math.cos(math.radians(40.0))
-"""Angle to another vehicle below which one drives along with it (`safety.shield.frame.CROSSING_RAD`)."""
+"""Cosine of the angle to another vehicle below which one drives along with it (`safety.shield.frame.CROSSING_RAD`)."""
 _FAR_M: Final = 150.0
 """Way that no speed of these roads needs to be braked away in."""
 

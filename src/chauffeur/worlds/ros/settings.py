@@ -33,7 +33,7 @@ SENTENCE: Final = "The follower will ignore planned stops and obstacles; only th
 """Text that a person has to write, word for word, for a constant speed."""
 
 LONGEST_DAYS: Final = 31
-"""Longest validity of an acknowledgement; it is then written anew, or not."""
+"""Longest validity of an acknowledgement, days; it is then written anew, or not."""
 
 FASTEST_MPS: Final = 60.0
 """Above this a limit is a slip of the pen, or of the unit (216 km/h)."""

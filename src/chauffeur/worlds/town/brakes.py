@@ -25,7 +25,7 @@ _STEP_M: Final = 3.0
 """At most so much of their way from one look ahead to the next, so that nobody fast leaps over the ego."""
 _MOST_YAW_RADPS: Final = 0.8
 _CREEP_MPS: Final = 1.0
-"""Who was held to a stand is let go once there is room to go on like this; else it would creep into the ego."""
+"""Speed at which there must be room before a vehicle held to a stand is let go; else it would creep into the ego."""
 
 
 class TrafficBrakes:

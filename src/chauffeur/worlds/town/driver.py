@@ -67,7 +67,7 @@ _BEFORE_M: Final = 2.2
 """The front bumper stops so far before somebody's way."""
 _BEFORE_PERSON_M: Final = 3.0
 _GIVES_WAY_MPS: Final = 0.5
-"""Who is as slow as this before a car that is in their way waits for it."""
+"""Speed up to which an agent before a car in its way counts as waiting for it."""
 _CLEAR_S: Final = 1.2
 """By how much time somebody who crosses is missed by a car that goes first."""
 _AFTER_S: Final = 0.4
@@ -85,7 +85,7 @@ _EVERY: Final = 2
 """The others are looked at every so many periods."""
 _KERB_M: Final = 2.6
 _WAITS_M: Final = 3.8
-"""Who stands as close to the line as that may be about to cross."""
+"""Distance from the line within which a standing agent may be about to cross."""
 _PEOPLE_MPS: Final = 4.5
 
 

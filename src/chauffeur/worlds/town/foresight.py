@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _STEP_S: Final = 0.5
 TIMES_S: Final = np.arange(0.0, 6.01, _STEP_S)
 _BACK_TO_THE_MIDDLE: Final = np.maximum(0.0, 1.0 - TIMES_S / 3.0)
-"""Who is beside the middle of their lane is back there after 3 s."""
+"""Share of the offset from the lane's middle left at each of `TIMES_S`: none after 3 s."""
 _MOST_DISCS: Final = 5
 _SPREAD: Final = np.array(
     [

@@ -11,7 +11,7 @@ from chauffeur.worlds.town.way import Stretch, first_m
 
 NEAR_M: Final = 70.0
 COMING_S: Final = 5.0
-"""Who is fast is minded from farther away: from as far as it gets in that time."""
+"""Time by which a fast vehicle is minded from farther away: from as far as it gets in it."""
 _ASIDE_M: Final = 8.0
 """Distance of an agent's middle from a lane beyond which it is not in it."""
 _UPSTREAM_M: Final = 60.0
