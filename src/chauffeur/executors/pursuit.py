@@ -62,7 +62,7 @@ _STANDING_MPS: Final = 0.1
 _LOOKS_S: Final = 1.0
 """Time the car stands at a stop sign before it may go."""
 _CLEAR_S: Final = 2.0
-"""By how much time somebody who crosses must be missed when the car leaves a stop sign."""
+"""Time by which a crossing agent must be missed when the car leaves a stop sign."""
 _SHORTEST_LOOK_M: Final = 2.0
 """Nearer than this a car that creeps winds itself off its path."""
 

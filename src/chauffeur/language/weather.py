@@ -45,7 +45,7 @@ _CLAUSES: Final = re.compile(r"[,.;!?:]\s|\s-\s|\s(?:but|and|because|although|th
 
 
 def weather_of(situation: Situation) -> int:
-    """Bits of a situation's weather; `UNKNOWN` where nobody told it."""
+    """Bits of a situation's weather; `UNKNOWN` where no one told it."""
     return _kinds(" ".join(said for name, said in situation.scene if name == WEATHER_FACT))
 
 

@@ -23,7 +23,7 @@ _FAR_M: Final = 150.0
 
 
 def fit_to_begin(everybody: Sequence[VehicleState]) -> bool:
-    """True if nobody has crashed, nobody overlaps, and whoever comes up behind another can still brake for it.
+    """True if no vehicle has crashed or overlaps another, and each that comes up behind another can still brake for it.
 
     Args:
         everybody: The ego and all that is solid around it; stop signs are not.

@@ -64,18 +64,18 @@ _MOST_BRAKING_MPS2: Final = 8.0
 _CLOSE_M: Final = 1.0
 """Gap to which a car with its tail over a stop line draws up to the one ahead."""
 _BEFORE_M: Final = 2.2
-"""The front bumper stops so far before somebody's way."""
+"""Distance before an agent's way at which the front bumper stops."""
 _BEFORE_PERSON_M: Final = 3.0
 _GIVES_WAY_MPS: Final = 0.5
 """Speed up to which an agent before a car in its way counts as waiting for it."""
 _CLEAR_S: Final = 1.2
-"""By how much time somebody who crosses is missed by a car that goes first."""
+"""Time by which a car that goes first misses a crossing agent."""
 _AFTER_S: Final = 0.4
 _ACCELERATING_MPS2: Final = 1.5
 _CHANGE_LEAST_M: Final = 14.0
 _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
-"""Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
+"""Distance before a lane's end at which a car waits for a gap, with room left to change lanes."""
 _SEAM_M: Final = 45.0
 """A change that is begun before a seam of the road ends at most so far beyond it."""
 _LANE_BESIDE_M: Final = 5.0

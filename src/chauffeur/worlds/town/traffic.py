@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 DENSITY_PER_KM: Final = 8.0
 """Vehicles per km of lane at most: above that, small towns stand still (see docs/town.md)."""
 STUCK_PERIODS: Final = 2400
-"""Who has got nowhere for so many periods (120 s) is taken out, and put in elsewhere: CARLA clears jams alike."""
+"""Periods (120 s) without progress after which a car is taken out, and put in elsewhere: CARLA clears jams alike."""
 _NOWHERE_M: Final = 20.0
 """Two cars' lengths a cycle of the lights and less is no queue but a jam, which spreads over a small town."""
 _WAY_M: Final = 1200.0
