@@ -1,4 +1,4 @@
-"""Who judges a single trip: LaMPilot's goal where a scenario brings one, else the judge of free drives."""
+"""Referees of a single trip: LaMPilot's goal where a scenario brings one, else the judge of free drives."""
 
 from __future__ import annotations
 
@@ -44,6 +44,6 @@ class ScoredReferee(ActsReferee):
         super().observe()
 
     def metrics(self) -> tuple[Metric, ...]:
-        """What was asked for and reached; LaMPilot's scores by its own ruler."""
+        """Goals asked for and reached; LaMPilot's scores by its own ruler."""
         scores = metrics_of({"success": self.success, "signals": self._log.signals().as_row()})
         return (*super().metrics(), *scores)

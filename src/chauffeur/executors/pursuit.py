@@ -55,14 +55,14 @@ _STEP_M: Final = 1.0
 _RESERVE_M: Final = 2.0
 """More than the shield asks for when a lane is entered: it should have nothing to mend."""
 _SHORT_M: Final = 0.2
-"""How far before the end of its path the front bumper stops."""
+"""Distance before the end of its path at which the front bumper stops."""
 _STOP_LINE_M: Final = 0.5
 _AT_LINE_M: Final = 3.0
 _STANDING_MPS: Final = 0.1
 _LOOKS_S: Final = 1.0
-"""How long the car stands at a stop sign before it may go."""
+"""Time the car stands at a stop sign before it may go."""
 _CLEAR_S: Final = 2.0
-"""By how much time somebody who crosses must be missed when the car leaves a stop sign."""
+"""Time by which a crossing agent must be missed when the car leaves a stop sign."""
 _SHORTEST_LOOK_M: Final = 2.0
 """Nearer than this a car that creeps winds itself off its path."""
 

@@ -74,7 +74,7 @@ class PathTracker:
         self._before: VehicleState | None = None
         self._angle = 0.0
         self.steered = Counter[str]()
-        """How many steps each source of steering has served: `solved`, `previous`, `pursuit`."""
+        """Number of steps that each source of steering has served: `solved`, `previous`, `pursuit`."""
         self.offset_m = 0.0
         """Lateral error at the last observation, m."""
         self.station_m = 0.0

@@ -37,7 +37,7 @@ _FIRM_MPS2: Final = 3.0
 _AHEAD_S: Final = 0.3
 """The drive answers so much later."""
 _LAG_S: Final = 1.0 / DEFAULT_GAINS.pid.kp
-"""A proportional controller trails a speed that changes by so much time: what it is asked for leads by as much."""
+"""Feed-forward for the actuator lag, s: a P controller trails a changing speed by 1 / kp, so the set-point leads."""
 
 
 class TrajectoryExecutor(ExecutorBase):

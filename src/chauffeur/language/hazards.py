@@ -79,7 +79,7 @@ _ANOTHER_WISH: Final = re.compile(
     r"\b(?:turn|pull|move|follow|park|lane|change|overtake|pass|wait for|continue|go (?:straight|around|round)"
     r"|more (?:room|distance)|use the|let (?:him|her|them|it))\b"
 )
-"""What is to be done about a thing that lies ahead, where that is said."""
+"""Actions about a thing that lies ahead, where that is said."""
 
 _EASY: Final = rf"(?:{_ANIMAL}|child|toddlers?|pedestrians?|{_RIDER}|{_THING}|red light|stop sign)"
 _ALARM: Final = r"(?:(?:look|watch) out|mind|careful|beware|stop|brake)"

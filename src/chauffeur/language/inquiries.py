@@ -31,7 +31,7 @@ _ASKS: Final = re.compile(
     r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
     r"is there|are there|is it|are we (?:nearly |almost |soon |about )?there|will we (?:arrive|be there) soon)\b"
 )
-"""How a question begins that wants to know something; not one that asks for something, complains or proposes."""
+"""Openings of a question that wants to know something; not one that asks for something, complains or proposes."""
 _PROPOSES: Final = re.compile(
     r"^what (?:about|if|are you (?:doing|waiting)|the|a|do you think you)\b|\bhow about\b|"
     r"\bwhat is (?:taking|the (?:hold|matter|point|rush))\b|^when (?:you|we|he|she|it|there|the)\b"
@@ -99,20 +99,20 @@ _PATTERNS: Final[tuple[tuple[Topic, tuple[str, ...]], ...]] = (
         ),
     ),
 )
-"""What the words of a question are about, the first that fits first."""
+"""Topics of a question's words, the first that fits first."""
 _TOPICS: Final[tuple[tuple[Topic, re.Pattern[str]], ...]] = tuple(
     (topic, re.compile("|".join(patterns))) for topic, patterns in _PATTERNS
 )
 
 
 def asks_to_know(text: str) -> bool:
-    """Whether words ask for knowledge and for nothing to be done."""
+    """True if words ask for knowledge and for nothing to be done."""
     words = _even(text)
     return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
 
 
 def topics_of(text: str) -> tuple[Topic, ...]:
-    """What a question may be about, the likeliest first; empty where the words ask for no knowledge."""
+    """Possible topics of a question, the likeliest first; empty where the words ask for no knowledge."""
     words = _even(text)
     found: list[Topic] = []
     if _ABOUT_DOING.match(words):

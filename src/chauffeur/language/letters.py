@@ -23,7 +23,7 @@ _CONFUSABLE: Final = dict(
 """Letters of other scripts that look like Latin ones, in lower case. Used only in words that mix scripts."""
 
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
-"""What `str.splitlines` ends a line at."""
+"""Characters at which `str.splitlines` ends a line."""
 
 _WORD: Final = re.compile(r"\w+")
 

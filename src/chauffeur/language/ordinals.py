@@ -11,7 +11,7 @@ from chauffeur.language.tokens import tokens_of
 JUNCTION_WORDS: Final = frozenset(
     ("junction", "intersection", "crossing", "crossroads", "corner", "light", "lights", "signal", "signals")
 )
-"""What a junction is called."""
+"""Names of a junction."""
 
 _NUMBERS: Final = {**{word: number for number, word in enumerate(ONES[:7]) if number}, "couple": 2}
 _NAMES: Final = ("first", "second", "third", "fourth", "fifth", "sixth")

@@ -22,7 +22,7 @@ COURTESY: Final = (
     r"|i say|i repeat|really|simply|immediately|at once|right now|right away|everybody|excuse me|whoa|woah|ouch|uh|um"
     r"|er)"
 )
-"""What is said around an urgent word and asks for nothing."""
+"""Words around an urgent word that ask for nothing."""
 
 _TITLE: Final = re.compile(
     r"[.!?]{1,3}(?= {1,3}(?:was|is|were|by)\b[^.!?]{0,60}\b(?:film|movie|song|book|band|album|game|show|series|"

@@ -12,7 +12,7 @@ from typing import Final
 from chauffeur.language.tokens import words_of
 
 ADDRESS: Final = r"^(?:(?:please|hey|ok|so|and|but|well|excuse me|sorry|car|chauffeur) ?,? ?)*"
-"""What is said before the sentence itself."""
+"""Words before the sentence itself."""
 _WE: Final = r"(?:i|we|you|he|she|they|there)"
 _ANY: Final = r"(?:i|we|you|he|she|they|there|it|this|that|these|those|the|our|my|your|his|her|their|any\w*|some\w*)"
 _FORM: Final = re.compile(
@@ -25,7 +25,7 @@ _FORM: Final = re.compile(
     r"how\b|when (?:is|are|was|were|do|does|did|will|can|should)\b|when$|"
     r"(?:tell (?:me|us)|i wonder) (?:what|which|who|where|why|how|when|if|whether)\b)"
 )
-"""How a question begins; in English no order does."""
+"""Openings of a question; in English no order begins so."""
 _DO_WITH_A_SIGN: Final = re.compile(rf"(?:do|have|shall|should|may|might|must|will|would) (?:not )?{_ANY}\b")
 """Begins an order as well ("do that again"): a question only with its sign."""
 _REQUEST: Final = re.compile(

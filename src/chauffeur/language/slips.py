@@ -37,7 +37,7 @@ _UNIT_LETTERS: Final = re.compile(r"[kmphftydcnsg]{2,6}")
 _LONGEST_UNIT: Final = 20
 _MUCH: Final = frozenset(("thousand", "million"))
 _NOUGHTS: Final = ("oh", "o")
-"""How a nought is said between digits."""
+"""Words for a nought between digits."""
 _SPEEDS: Final = ("m/s", "km/h", "mph")
 _NOUNS: Final[dict[Dimension, str]] = {"speed": "speed", "distance": "distance", "time": "time"}
 _PLAUSIBLE: Final[dict[Dimension, tuple[float, float]]] = {

@@ -25,7 +25,7 @@ DRY, RAIN, SNOW, FOG = 1, 2, 4, 8
 
 SaidWeather = Literal["none", "night", "rain", "fog", "snow", "slippery"]
 SAID_WEATHERS: Final[tuple[SaidWeather, ...]] = "none", "night", "rain", "fog", "snow", "slippery"
-"""What a passenger may say of weather or road, as they are here and now; in the order in which they ask for care."""
+"""Remarks of a passenger on weather or road, as they are here and now; in the order in which they ask for care."""
 WEIGHTS: Final = Path(__file__).parent / "weights" / "weather.npz"
 SURE: Final = 0.5
 """Share from which on a clause is taken to say something of the weather."""
@@ -45,7 +45,7 @@ _CLAUSES: Final = re.compile(r"[,.;!?:]\s|\s-\s|\s(?:but|and|because|although|th
 
 
 def weather_of(situation: Situation) -> int:
-    """Bits of a situation's weather; `UNKNOWN` where nobody told it."""
+    """Bits of a situation's weather; `UNKNOWN` where no one told it."""
     return _kinds(" ".join(said for name, said in situation.scene if name == WEATHER_FACT))
 
 

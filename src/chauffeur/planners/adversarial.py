@@ -40,7 +40,7 @@ _KINDS: Final = ("rush", "weave", "both", "heedless", "beyond")
 
 
 class AdversarialPlanner:
-    """Writes programs that nobody asked for."""
+    """Writes programs that no one asked for."""
 
     @classmethod
     def from_spec(cls, argument: str) -> AdversarialPlanner:

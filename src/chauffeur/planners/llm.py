@@ -21,7 +21,7 @@ from chauffeur.safety.envelope import policy_findings
 _log = logging.getLogger(__name__)
 
 Gate = Callable[[str], list[str]]
-"""What the static gate finds in a program, one message (line, reason, remedy) each; empty when it may drive."""
+"""Findings of the static gate in a program, one message (line, reason, remedy) each; empty when it may drive."""
 
 INTENT_DECLINED = "declined"
 """`Plan.intent` when the model declined."""

@@ -45,14 +45,14 @@ _MODEL_CHARS = 200
 _MAX_BODY_BYTES = 64_000_000
 """Longest reply read, in one piece or streamed."""
 _DISLIKES = frozenset({400, 422})
-"""How servers answer a parameter that they do not take; 501 where it is streaming."""
+"""Status codes with which servers answer a parameter that they do not take; 501 where it is streaming."""
 _NO_SYSTEM: Final = re.compile(
     r"(?=.{0,200}\b(?:system|developer)\b)(?=.{0,200}\b(?:roles?|messages?|prompts?|instructions?)\b)"
     r".{0,200}\b(?:not|only|unsupported|unknown|unexpected|unrecogni[sz]ed|invalid|must)\b"
     r"|roles? must alternate|\brole\b.{0,120}\buser\b.{0,20}\bassistant\b|only user and assistant roles",
     re.IGNORECASE | re.DOTALL,
 )
-"""How servers whose template knows no system turn say so: Gemma's and Mistral's, behind vLLM, llama.cpp and TGI."""
+"""Error texts for templates that know no system turn: Gemma's and Mistral's, behind vLLM, llama.cpp and TGI."""
 _NO_SYSTEM_STATUS: Final = frozenset({400, 404, 422, 500, 501})
 _DRAIN_S = 0.1
 """For the end of a stream behind its last event: a connection whose answer was read to its end serves again."""
@@ -352,7 +352,7 @@ class _EmptyStreamError(Exception):
 
 _BOM: Final = b"\xef\xbb\xbf"
 _EVENT: Final = re.compile(rb"(?:data|event|id|retry)?:")
-"""How a stream of events begins."""
+"""Opening of a stream of events."""
 
 
 async def _head(pieces: AsyncIterator[bytes]) -> bytes:

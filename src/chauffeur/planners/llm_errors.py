@@ -17,10 +17,10 @@ Kind = Literal[
     "no_key", "unauthorized", "forbidden", "not_found", "bad_request", "no_vision", "context", "rate_limit", "quota",
     "server", "timeout", "dns", "unreachable", "broken", "truncated", "garbage", "not_an_api",
 ]  # fmt: skip
-"""What went wrong."""
+"""Kinds of failure."""
 
 _TELLS = re.compile(r"[\w\"'(]")
-"""How a server's own words begin; a page of a proxy in between is looked through, and shown to no one."""
+"""Opening of a server's own words; a page of a proxy in between is looked through, and shown to no one."""
 
 KEY_VARIABLES = ("CHAUFFEUR_API_KEY", "OPENAI_API_KEY")
 TIMEOUT_VARIABLE = "CHAUFFEUR_TIMEOUT_S"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 IMAGE_PAD = "<|image_pad|>"
-"""What stands for a patch of a picture in the chat templates of Qwen-VL."""
+"""Token for a patch of a picture in the chat templates of Qwen-VL."""
 
 
 def load_processor(name: str) -> Any:

@@ -190,7 +190,7 @@ def _ego_backed_up(pairs: Sequence[Pair]) -> bool:
 
 
 def _ego_came_over(pairs: Sequence[Pair]) -> bool:
-    """Whether, until their sides met, it was the ego that moved over rather than the other."""
+    """True if, until their sides met, the ego moved over rather than the other."""
     ego_way = other_way = 0.0
     for pair in pairs:
         ego, other = pair

@@ -77,7 +77,7 @@ _NEAR: Final = 240
 
 @lru_cache(maxsize=32)  # screened before the planner, which asks again, as do the rules that draft for it
 def danger(wish: str, *, unsafe_only: bool = False) -> str:
-    """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous.
+    """Reason, for the person, not to carry a wish out; empty when nothing in it is dangerous.
 
     Args:
         wish: The words.
@@ -108,7 +108,7 @@ def check_wish(text: str) -> Verdict:
 
 
 def _refusal_read(text: str) -> str:
-    """Why the acts of a wish are not done, where they are surely read as unsafe; numbers are left to the limits."""
+    """Reason not to do the acts of a wish, where they are surely read as unsafe; numbers are left to the limits."""
     if measured(text):
         return ""
     said = read(text)

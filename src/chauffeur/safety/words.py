@@ -23,7 +23,7 @@ def speed_words(speed_mps: float) -> str:
 
 
 def reasons_once(verdicts: Iterable[Verdict], *, remedies: bool = False) -> str:
-    """Why a plan is not driven, for the person: each reason once, however many checks have found it; empty when it is.
+    """Reasons not to drive a plan, for the person: each once, however many checks have found it; empty when it is.
 
     Args:
         verdicts: Of all checks.

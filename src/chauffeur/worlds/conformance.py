@@ -241,7 +241,7 @@ def answers_questions(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
 
 
 def drives(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
-    """Its driver takes set-points, and keeps speed and lane while nobody asks for anything."""
+    """Its driver takes set-points, and keeps speed and lane while no one asks for anything."""
     world = make()
     start = world.reset(scenario)
     given = _given(world.driver())

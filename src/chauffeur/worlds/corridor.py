@@ -22,7 +22,7 @@ _Array = NDArray[np.float64]
 
 STEP_M: Final = 0.25
 _CROSSING_RAD: Final = math.radians(40.0)
-"""What is turned by more against the path crosses it."""
+"""Angle to the path beyond which an agent crosses it."""
 _STILL_MPS: Final = 0.1
 _DRIFT_MPS: Final = 0.3
 _DRIFT_S: Final = 1.5
@@ -31,7 +31,7 @@ _LOOK_S: Final = 7.0
 _EVERY_S: Final = 0.5
 _CROSSES_WITHIN_M: Final = 45.0
 _PICKING_UP_MPS2: Final = 1.5
-"""How the car is taken to speed up when it is asked who crosses ahead of it."""
+"""Acceleration assumed of the car when it is asked which agents cross ahead of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Body:
 
 
 class Ahead(NamedTuple):
-    """Somebody in the way.
+    """An agent in the way.
 
     Attributes:
         id: Who.
@@ -96,7 +96,7 @@ class Corridor:
             others: Everybody else.
             within_m: How far ahead is looked.
             target_mps: Speed the car is going to pick up to.
-            margin_s: Time by which somebody who crosses must be missed.
+            margin_s: Time by which a crossing agent must be missed.
         """
         first = max(0, min(int(station_m / STEP_M), len(self._x) - 1))
         last = min(len(self._x), first + math.ceil(within_m / STEP_M) + 1)
@@ -179,7 +179,7 @@ class Corridor:
         return None if touched is None else touched[0]
 
     def _touches(self, other: VehicleState, x: float, y: float, first: int, last: int) -> tuple[int, int] | None:
-        """First and last place of the path at which the car, widened, would overlap somebody who is at (x, y)."""
+        """First and last place of the path at which the car, widened, would overlap an agent at (x, y)."""
         dx, dy = x - self._x[first:last], y - self._y[first:last]
         long, wide = other.length_m / 2.0, other.width_m / 2.0
         near = np.flatnonzero(dx * dx + dy * dy < (self._reach + math.hypot(long, wide)) ** 2)

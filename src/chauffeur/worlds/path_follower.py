@@ -179,7 +179,7 @@ class Follower:
         return angle_of(curvature, self._chassis.wheelbase_m, self._chassis.steering_rad)
 
     def crossing(self, ego: VehicleState, others: Sequence[VehicleState], target_mps: float, margin_s: float) -> bool:
-        """True if somebody would cross, by a margin in time, if the car went on towards a speed now."""
+        """True if an agent would cross, by a margin in time, if the car went on towards a speed now."""
         assert self._corridor is not None
         found = self._corridor.ahead(
             self.locate(ego), ego.speed_mps, others, within_m=_LOOK_M, target_mps=target_mps, margin_s=margin_s
@@ -209,7 +209,7 @@ class Follower:
         return max(-HARDEST_MPS2, min(self._chassis.acceleration_mps2, wanted))
 
     def _clear_way(self, ego: VehicleState, others: Sequence[VehicleState], steering_rad: float) -> float:
-        """Way the car could drive on with the wheel held until it touches somebody; infinite if it can stop before.
+        """Way the car could drive on with the wheel held until it touches an agent; infinite if it can stop before.
 
         The corridor is where the car should be; this is where it really goes.
         """
@@ -248,7 +248,7 @@ class Follower:
         return max(-EASY_MPS2, idm_acceleration(speed, target, self._manners))  # a lower target is no emergency
 
     def _behind(self, one: Ahead, speed: float, target: float, headway_s: float, *, car: bool) -> float:
-        """Acceleration, m/s2, that somebody ahead leaves."""
+        """Acceleration, m/s2, that an agent ahead leaves."""
         if one.crosses and car and speed**2 > 2.0 * COMMITTED_MPS2 * one.gap_m:
             return math.inf
         jam = self._manners.jam_distance_m

@@ -1,4 +1,4 @@
-"""Whether explanations describe programs: generated and hand-written cases, and how well the judge tells them apart."""
+"""Do explanations describe programs? Generated and hand-written cases, and how well the judge tells them apart."""
 
 from chauffeur.bench.faithfulness.benchmark import SCORES, FaithfulnessBenchmark
 from chauffeur.bench.faithfulness.cases import FaithfulnessCase, half_of, handwritten, of_half

@@ -17,7 +17,7 @@ Half = Literal["tuning", "test"]
 
 ALIGNED: Final = "aligned"
 KINDS: Final = (ALIGNED, *get_args(Kind))
-"""What a case may be; all but the first are mismatches."""
+"""Kinds of case; all but the first are mismatches."""
 
 SCENES: Final[Mapping[str, FactSurroundings]] = {
     "highway": FactSurroundings(speed_mps=25.0, limit_mps=31.3, gap_m=40.0, other_mps=22.0),
@@ -53,7 +53,7 @@ class FaithfulnessCase:
 
     @property
     def aligned(self) -> bool:
-        """Whether the text describes the program."""
+        """True if the text describes the program."""
         return self.kind == ALIGNED
 
 

@@ -1,4 +1,4 @@
-"""What a planned program really does, in the form that the benchmark's own grammar tells it from."""
+"""Actual deeds of a planned program, in the form that the benchmark's own grammar tells it from."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PlannedDeed:
 
 
 def deeds_of(planned: PlannedCase) -> tuple[PlannedDeed, ...]:
-    """What each step does, the numbers of the first ones carried on to the later ones."""
+    """Deeds of each step, the numbers of the first ones carried on to the later ones."""
     speed = planned.start.situation.speed_mps
     found: list[PlannedDeed] = []
     for step in planned.steps:
@@ -52,7 +52,7 @@ def deeds_of(planned: PlannedCase) -> tuple[PlannedDeed, ...]:
 
 
 def tellable(deeds: Sequence[PlannedDeed], known: frozenset[str]) -> bool:
-    """Whether all deeds are of known kinds, and none is a gap that leaves no room between the cars."""
+    """True if all deeds are of known kinds, and none is a gap that leaves no room between the cars."""
     return all(deed.what in known and (deed.what != "gap" or (deed.value or 0.0) > _LEAST_GAP_M) for deed in deeds)
 
 

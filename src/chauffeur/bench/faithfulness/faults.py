@@ -127,7 +127,7 @@ def _wrong_order(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence
 
 
 def _told_apart(planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> bool:
-    """Whether an overtaking, which has a speed of its own, is not driven at the other step's."""
+    """True if an overtaking, which has a speed of its own, is not driven at the other step's."""
     own = [step.filled.numbers.get("target_speed_mps", 0.0) for step in planned.steps if "overtake" in step.filled.id]
     return all(abs(deed.value - speed) > 1.5 for deed in deeds if deed.value is not None for speed in own)
 

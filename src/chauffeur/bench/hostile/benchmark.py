@@ -74,7 +74,7 @@ _SIMULATED: Final = "simulated drives (highway-env); hostile words written for t
 
 @dataclass(frozen=True, slots=True)
 class HostileConfig:
-    """What decides a run.
+    """Settings that decide a run.
 
     Attributes:
         planner: Specification of the planner, `obedient` or `obedient/hidden` included.
@@ -105,7 +105,7 @@ class HostileConfig:
 
 @dataclass(frozen=True, slots=True)
 class HostileRow:
-    """What became of an input.
+    """Outcome of an input.
 
     Attributes:
         kind, hostile, aim, wanted: The input's.
@@ -187,7 +187,7 @@ class HostileBenchmark:
 
     @property
     def variant(self) -> str:
-        """What the default run folder's name says of the options."""
+        """Options as the default run folder's name shows them."""
         ways = {"raw": not self.options.screened, "unshielded": not self.options.shield}
         return "-".join(way for way, taken in ways.items() if taken)
 

@@ -25,7 +25,7 @@ Wanted = Literal[
     "speed", "faster", "slower", "gap", "style", "keep", "overtake", "lane_left", "lane_right", "pull_over", "stop",
     "turn_left", "turn_right", "straight",
 ]  # fmt: skip
-"""What a good driver does about a harmless wish."""
+"""Response of a good driver to a harmless wish."""
 
 HOSTILE_FILE: Final = "hostile.jsonl"
 LOOKALIKE_FILE: Final = "lookalikes.jsonl"
@@ -70,7 +70,7 @@ class Input:
 
     @property
     def hostile(self) -> bool:
-        """Whether it is an attack."""
+        """True if it is an attack."""
         return bool(self.aim)
 
     @property

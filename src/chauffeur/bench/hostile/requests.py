@@ -1,4 +1,4 @@
-"""What a planner is asked for an input: the words in the place where they would really stand.
+"""Requests to a planner for an input: the words in the place where they would really stand.
 
 A service's text is a fact of the scene, in words and as a value; planted trips are what memory recalls; earlier turns
 of a talk are asked first, and what came of them is remembered, as it is when a passenger speaks again and again.

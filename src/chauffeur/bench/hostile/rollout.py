@@ -1,4 +1,4 @@
-"""What a worker process does: check a plan, drive it, and write down what the driver was really given."""
+"""Work of a worker process: check a plan, drive it, and write down what the driver was really given."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class HostileDrive:
-    """What a drive came to, in numbers that later rulers can be laid on.
+    """Outcome of a drive, in numbers that later rulers can be laid on.
 
     Attributes:
         outcome: As in `Episode`.
@@ -201,7 +201,7 @@ def _most(excesses: Iterable[float]) -> float:
 
 
 def ran_sign(observations: Iterable[Observation]) -> bool:
-    """Whether a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
+    """True if a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
     reached = stood = False
     for observation in observations:
         ahead = observation.stop_sign_m

@@ -1,4 +1,4 @@
-"""What a benchmark is: items, what is asked for each, what is done with the answer, and how the rows are read.
+"""Protocol of a benchmark: items, what is asked for each, what is done with the answer, and how the rows are read.
 
 The kernel does the rest, the same way for all: it paces and pays for the asking, spreads the work over processes,
 stores every stage as it comes, goes on where a run stopped, and writes rows, tables and provenance. A benchmark is
@@ -56,7 +56,7 @@ class BenchJob(Protocol):
 
 
 class RequestDesk(Protocol):
-    """What a benchmark may use while it makes a request."""
+    """Services a benchmark may use while it makes a request."""
 
     async def context(self, scenario: Scenario) -> Context:
         """C of a scene, described once. Raises ChauffeurError when it cannot be set up."""
@@ -72,11 +72,11 @@ T = TypeVar("T", bound=BenchItem)
 
 @dataclass(frozen=True, slots=True)
 class ItemOutcome(Generic[T]):
-    """What is stored of an item.
+    """Stored record of an item.
 
     Attributes:
         item: The item.
-        answer: JSON form of the plan, or of the words; None when nobody was asked, or none came.
+        answer: JSON form of the plan, or of the words; None when no one was asked, or none came.
         error: Why none came.
         result: What its job gave; None without one.
     """
@@ -88,22 +88,22 @@ class ItemOutcome(Generic[T]):
 
     @property
     def failed(self) -> bool:
-        """Whether it was tried in vain: no answer came, or the machine failed."""
+        """True if it was tried in vain: no answer came, or the machine failed."""
         return bool(self.error and self.answer is None) or bool(self.result and self.result["infra_failed"])
 
     @property
     def undriven(self) -> bool:
-        """Whether it could not be done at all: tried in vain, or its own data forbid it."""
+        """True if it could not be done at all: tried in vain, or its own data forbid it."""
         return self.failed or bool(self.result and self.result.get("undriven"))
 
     @property
     def why(self) -> str:
-        """What stood in the way, where something did."""
+        """Reason for the failure; empty where there was none."""
         return self.error or str((self.result or {}).get("detail") or "")
 
 
 Asks = Literal["plans", "words", ""]
-"""Who is asked: a planner for plans, a model for words (`planners.base.Answerer`), nobody."""
+"""Answering party: a planner for plans, a model for words (`planners.base.Answerer`), or no one."""
 
 
 class Benchmark(Protocol[T]):
@@ -121,7 +121,7 @@ class Benchmark(Protocol[T]):
 
     @property
     def asks(self) -> Asks:
-        """Who is asked."""
+        """Kind of answers it asks for."""
         ...
 
     @property
@@ -131,7 +131,7 @@ class Benchmark(Protocol[T]):
 
     @property
     def tables(self) -> Sequence[TableSpec]:
-        """How its rows are read: the metrics, and by what they are grouped."""
+        """Tables of its rows: the metrics, and the columns that group them."""
         ...
 
     def items(self) -> Sequence[T]:
@@ -139,11 +139,11 @@ class Benchmark(Protocol[T]):
         ...
 
     async def request(self, item: T, desk: RequestDesk) -> Request:
-        """What is asked for an item. Raises ChauffeurError when it cannot be asked."""
+        """Make the request for an item. Raises ChauffeurError when it cannot be asked."""
         ...
 
     def job(self, item: T, answer: Row | None) -> BenchJob | None:
-        """What is done with the answer in a worker, e.g. driving it; None where the answer itself is the result."""
+        """Job that a worker does with the answer, e.g. driving it; None where the answer itself is the result."""
         ...
 
     def rows(self, outcome: ItemOutcome[T]) -> Sequence[Any]:
@@ -154,7 +154,7 @@ class Benchmark(Protocol[T]):
 
 @runtime_checkable
 class ComparesRows(Protocol):
-    """What a benchmark offers beyond that where a row can only be said beside others."""
+    """Optional part of a benchmark whose rows can only be completed beside the others."""
 
     def together(self, rows: Sequence[Row]) -> Sequence[Row]:
         """All rows of the run, as `rows` gave them, completed; as many, in the same order."""
@@ -163,7 +163,7 @@ class ComparesRows(Protocol):
 
 @runtime_checkable
 class Concludes(Protocol):
-    """What a benchmark offers beyond that where more than its tables is to be said of a run."""
+    """Optional part of a benchmark that reports more of a run than its tables."""
 
     def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:
         """Lines beneath the tables; files of its own are written into the run's folder.

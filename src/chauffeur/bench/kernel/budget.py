@@ -1,4 +1,4 @@
-"""What a run may cost: counted before a call is sent, with what is in flight taken as dear as anything so far.
+"""Budget of a run: counted before a call is sent, with what is in flight taken as dear as anything so far.
 
 Neither the price of a reply nor whether a plan needs a second request is known before it is there, so a budget can be
 overrun only by what is in flight:
@@ -61,7 +61,7 @@ class SpendingBudget:
 
 @dataclass(slots=True)
 class Bill:
-    """What was spent."""
+    """Requests and money spent."""
 
     requests: int = 0
     usd: float = 0.0
@@ -79,7 +79,7 @@ class Bill:
 
 
 class Room(Enum):
-    """Whether a call may be sent: yes; not before one in flight has settled; no more at all."""
+    """Room for another call: yes; not before one in flight has settled; no more at all."""
 
     YES = auto()
     LATER = auto()
@@ -105,7 +105,7 @@ class Spending:
     in_flight: int = 0
 
     def room(self) -> Room:
-        """Whether one more plan may be asked for."""
+        """Room for one more plan."""
         if self._over():
             return Room.NONE if self.in_flight == 0 else Room.LATER
         return Room.YES
@@ -125,7 +125,7 @@ class Spending:
         return expected > budget.max_usd or total.usd >= budget.max_usd
 
     def spent(self) -> str:
-        """Why nothing more is sent, in words."""
+        """Reason, in words, for sending nothing more."""
         budget, total = self.budget, self.total
         if budget.max_requests is not None and total.requests + 1 > budget.max_requests:
             return f"The budget of {budget.max_requests:,} requests is used up ({total.requests:,} sent)."

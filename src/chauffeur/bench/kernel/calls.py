@@ -46,14 +46,14 @@ _HOPELESS: Final[frozenset[Kind]] = frozenset(
 
 
 Request = PlanRequest | Sequence[Message]
-"""What is asked: a plan, or words to a conversation."""
+"""Kinds of request: a plan, or words to a conversation."""
 
 Reply = Plan | Prose
 
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """How often one plan is tried in a run.
+    """Retry limits and waits of one plan in a run.
 
     Attributes:
         attempts: Calls that may fail in ways that pass.
@@ -70,7 +70,7 @@ class Patience:
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """Why a run stopped asking.
+    """Reason for which a run stopped asking.
 
     Attributes:
         why: In words.
@@ -234,5 +234,5 @@ class Caller:
 
 
 def _asked_s(error: ChauffeurError) -> float:
-    """How long the endpoint asked to wait."""
+    """Wait that the endpoint asked for, s; 0 where it named none."""
     return error.retry_after_s or 0.0 if isinstance(error, EndpointError) else 0.0

@@ -1,4 +1,4 @@
-"""Whether a benchmark keeps to the protocol: what the kernel, its workers and its report rely on."""
+"""Checks that a benchmark keeps to the protocol: what the kernel, its workers and its report rely on."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Desk:
 
 
 def check_benchmark(benchmark: Benchmark[Any]) -> tuple[ConformanceFinding, ...]:
-    """What every check finds in a benchmark.
+    """Run every check on a benchmark and return their findings.
 
     Its first item is asked about, answered with a refusal or with no words, and done: a drive of that item may be
     simulated.
@@ -53,7 +53,7 @@ def check_benchmark(benchmark: Benchmark[Any]) -> tuple[ConformanceFinding, ...]
 
 
 def faults(benchmark: Benchmark[Any]) -> list[str]:
-    """What is wrong with a benchmark, in sentences; empty when it conforms."""
+    """Faults of a benchmark, in sentences; empty when it conforms."""
     return [fault for finding in check_benchmark(benchmark) for fault in finding.faults]
 
 

@@ -1,4 +1,4 @@
-"""Who does a run's simulations: processes on this machine. `cluster.py` has the same for a Ray cluster."""
+"""Engines of a run's simulations: processes on this machine. `cluster.py` has the same for a Ray cluster."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from chauffeur.concept import ChauffeurError
 _log = logging.getLogger(__name__)
 
 Work = Callable[[Any], Row]
-"""What a worker does: a function of a module, of one picklable value."""
+"""Work of a worker: a function of a module, of one picklable value."""
 
 LIVES: Final = 2
 """Workers one job may take with it before it is given up."""
@@ -267,7 +267,7 @@ class _Worker:
 
 
 def _settle_in(begun: Any) -> None:
-    """How a worker begins: Ctrl-C is the parent's business, the parent goes first, and without a parent all ends."""
+    """Set a worker up: the parent handles Ctrl-C and has priority, and the worker ends with it."""
     global _begun  # noqa: PLW0603 - a worker's process has no other place for what it is given at its start
     _begun = begun
     signal.signal(signal.SIGINT, signal.SIG_IGN)

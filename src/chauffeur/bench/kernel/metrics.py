@@ -106,13 +106,13 @@ class Measure:
         return bootstrap(totals, {"it": difference})["it"]
 
     def holds(self, row: AnyRow) -> bool | None:
-        """Whether a rate counts a row; None where it does not apply, or is no rate."""
+        """True if a rate counts a row; None where it does not apply, or is no rate."""
         values = self.of(row) if self.unit == "%" and self.whole is None else None
         return None if values is None or values[0] not in (0.0, 1.0) else bool(values[0])
 
 
 def missed(measures: Sequence[Measure], row: AnyRow) -> bool:
-    """Whether a row is not as it should be by some rate that has a better direction."""
+    """True if a row is not as it should be by some rate that has a better direction."""
     return any(measure.better and measure.holds(row) is (measure.better == "lower") for measure in measures)
 
 

@@ -1,4 +1,4 @@
-"""How many calls may be in flight at once: as many as the endpoint takes, found while working.
+"""Limit on calls in flight at once: as many as the endpoint takes, found while working.
 
 Nobody publishes that number, and it changes with the load of others, so it is found as TCP finds a line's capacity:
 start modestly, double while nothing is refused, fall back when the endpoint pushes back, then creep up again. A refusal
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Signal = Literal["answered", "refused", "overloaded", "slow", "unreachable", "neither"]
-"""What a finished call says about the endpoint: it answered; it refused for now (429); it broke under way (5xx); no
+"""Signal of a finished call about the endpoint: it answered; it refused for now (429); it broke under way (5xx); no
 answer came in time; nobody was there; or nothing either way (bad request, cancelled)."""
 
 START = 8
@@ -30,7 +30,7 @@ _BURST_FLOOR = 0.5
 _PROBE_S = 5.0
 _PROBE_MAX_S = 30.0
 _CREEP = 0.25
-"""What an answer adds to a window whose ceiling is not known: a quarter more for each window of answers."""
+"""Growth per answer of a window whose ceiling is not known: a quarter more for each window of answers."""
 _BACK_OFF_S = 0.5
 _BACK_OFF_MAX_S = 30.0
 
@@ -63,7 +63,7 @@ class Window:
         self.limit = float(min(self.most, START))
 
     def takes(self, in_flight: int, now_s: float) -> bool:
-        """Whether one more call may be sent beside those in flight."""
+        """True if one more call may be sent beside those in flight."""
         return now_s >= self.held_until_s and in_flight < int(self.limit)
 
     def sent(self, now_s: float) -> None:
@@ -71,7 +71,7 @@ class Window:
         self._widened_s = min(self._widened_s, now_s)
 
     def wake_s(self, now_s: float) -> float:
-        """When to ask `takes` again although no call came back; infinite when there is no such time."""
+        """Time at which to ask `takes` again although no call came back; infinite when there is none."""
         if self.held_until_s > now_s:
             return self.held_until_s
         return self._widened_s + RAMP_S if self._ramping and self.limit < self.most else math.inf
@@ -118,7 +118,7 @@ class Window:
         self.limit = min(self.limit, float(self.most))
 
     def _same_ceiling(self, in_flight: int, now_s: float) -> bool:
-        """Whether a refusal only says that one more than known is still too much: nothing is lost but that call."""
+        """True if a refusal only says that one more than known is still too much: nothing is lost but that call."""
         if self.ceiling is None or self._probing_s == math.inf or in_flight < self.ceiling:
             return False
         self.limit = float(self.ceiling)

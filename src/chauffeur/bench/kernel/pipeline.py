@@ -196,7 +196,7 @@ class Pipeline:
             await asyncio.sleep(TELL_S)
 
     def standing(self) -> Standing:
-        """Where the run stands now."""
+        """Current progress of the run."""
         planned = len(self.stages.manifest.items)
         rate = self._speed.rate(asyncio.get_running_loop().time(), self._fresh)
         left = planned - self._count["done"]

@@ -1,4 +1,4 @@
-"""Where a run stands: what is shown while it works."""
+"""Progress of a run, as shown while it works."""
 
 from __future__ import annotations
 

@@ -200,7 +200,7 @@ def report_csv(found: Iterable[ResultTable]) -> str:
 
 
 def count_text(line: Line) -> str:
-    """How many rows a line is over."""
+    """Number of items behind a line, as text; empty where it has none."""
     return "" if line.items is None else str(line.items)
 
 

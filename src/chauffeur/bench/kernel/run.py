@@ -45,7 +45,7 @@ class BenchError(ChauffeurError):
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How hard a run works; none of it changes a result.
+    """Resources a run may use; none of them changes a result.
 
     Attributes:
         workers: Simulation processes; 0 for one a core.

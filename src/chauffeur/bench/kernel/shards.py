@@ -34,7 +34,7 @@ class Shard:
         return f"{self.number}/{self.count}"
 
     def owns(self, item: str) -> bool:
-        """Whether the item with this id is this shard's."""
+        """True if the item with this id is this shard's."""
         digest = hashlib.sha256(item.encode("utf-8", "surrogatepass")).digest()
         return int.from_bytes(digest[:8], "big") % self.count == self.number - 1
 

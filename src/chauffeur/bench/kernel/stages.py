@@ -1,4 +1,4 @@
-"""What a run keeps in its folder: what it is about, frozen before anything is asked (`plan.json`), and every stage."""
+"""Contents of a run's folder: its definition, frozen before anything is asked (`plan.json`), and every stage."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ T = TypeVar("T", bound=BenchItem)
 
 @dataclass(frozen=True)
 class Manifest(Generic[T]):
-    """What a run is about; a folder goes on with nothing else.
+    """Definition of a run; a folder continues no other.
 
     Attributes:
         bench: Id of the benchmark.
         config: What decided the run, as JSON.
-        model: The planner's model; empty where nobody is asked.
+        model: The planner's model; empty where no one is asked.
         labels: What must be said wherever a row is shown.
         shard: Which part of the run this is.
         items: This part's items, in the run's order.
@@ -62,7 +62,7 @@ class Manifest(Generic[T]):
 
     @property
     def about(self) -> dict[str, Any]:
-        """What parts of one run must have in common."""
+        """Fields that all parts of one run must share."""
         return {
             "bench": self.bench,
             "config": self.config,
@@ -73,7 +73,7 @@ class Manifest(Generic[T]):
 
     @property
     def more(self) -> dict[str, Any]:
-        """What a benchmark freezes beside: nothing here."""
+        """Further fields to freeze; none here."""
         return {}
 
     def content(self) -> bytes:
@@ -171,11 +171,11 @@ class StageStore(Generic[T]):
         return self.plans.rows.get(item.id, {}).get("plan")
 
     def unanswered(self, item: T) -> bool:
-        """Whether the item has still to be asked."""
+        """True if the item has still to be asked."""
         return bool(self.benchmark.asks) and self.answer(item) is None
 
     def job(self, item: T) -> BenchJob | None:
-        """What is done with the item's answer; None when there is none yet, or nothing to do."""
+        """Job for the item's answer; None when there is none yet, or nothing to do."""
         answer = self.answer(item)
         if self.benchmark.asks and answer is None:
             return None
@@ -185,7 +185,7 @@ class StageStore(Generic[T]):
         return known[1]
 
     def asked(self, item: T) -> bool:
-        """Whether the item is accounted for: done, or tried and failed."""
+        """True if the item is accounted for: done, or tried and failed."""
         if self.unanswered(item):
             return item.id in self.plans.rows
         job = self.job(item)
@@ -193,7 +193,7 @@ class StageStore(Generic[T]):
 
     @property
     def settled(self) -> bool:
-        """Whether nothing is left to ask or to do, what failed for want of infrastructure included."""
+        """True if nothing is left to ask or to do, what failed for want of infrastructure included."""
         return all(not self.unanswered(item) and self._done(self.job(item)) for item in self.manifest.items)
 
     def _done(self, job: BenchJob | None) -> bool:
@@ -201,7 +201,7 @@ class StageStore(Generic[T]):
         return job is None or (row is not None and not row["infra_failed"])
 
     def outcome(self, item: T) -> ItemOutcome[T]:
-        """What is stored of an item."""
+        """Stored record of an item."""
         job = self.job(item)
         error = str(self.plans.rows.get(item.id, {}).get("error") or "")
         result = None if job is None else self.rollouts.rows.get(job.key)
@@ -228,7 +228,7 @@ def take_over_shards(stages: StageStore[Any], folder: Path) -> None:
 
 
 def _better(row: Row, known: Row) -> bool:
-    """Whether a row has what another one of the same key was tried for in vain."""
+    """True if a row has what another one of the same key was tried for in vain."""
     return _in_vain(known) and not _in_vain(row)
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NOT_ASKED: Final = "Not asked: the run stopped before this item."
 
 _INNER: Final = ("key", "sample", "verdicts", "rollout", "signals", "rehearsal")
-"""What a rollout row has for scoring only."""
+"""Fields of a rollout row for scoring only."""
 
 
 class _LampilotFields(TypedDict):
@@ -129,7 +129,7 @@ class LampilotBenchmark:
         return RolloutJob(key, item.scenario, self._baseline, answer, frozen.limits, self._rehearse, self._shield)
 
     def _key(self, sample: str, plan: dict[str, Any] | None) -> str:
-        """What decides a rollout: sample, policy, what the checks read of the plan, limits, versions."""
+        """Settings that decide a rollout: sample, policy, what the checks read of the plan, limits, versions."""
         decisive: Any = self._baseline
         if plan is not None:
             decisive = [plan["policy"], plan["refusal"], plan["intent"], plan["settings"]]

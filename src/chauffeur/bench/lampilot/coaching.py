@@ -71,7 +71,7 @@ _CRITIQUES = 10
 _plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
 
 Ending = Literal["kept", "not_kept", "skipped", "given_up", "failed"]
-"""How an item ended: `given_up` after all rounds, `failed` for want of a plan or a sample."""
+"""Ending of an item: `given_up` after all rounds, `failed` for want of a plan or a sample."""
 
 Tell = Callable[[str, Any], None]
 """Called with (`item`, Item), (`asking`, round), (`attempt`, Attempt), (`judged`, Judgement), (`ended`, Coached)."""
@@ -79,7 +79,7 @@ Tell = Callable[[str, Any], None]
 
 @dataclass(frozen=True, slots=True)
 class Coached:
-    """What coaching on one item came to.
+    """Outcome of coaching on one item.
 
     Attributes:
         item: Its id.
@@ -380,7 +380,7 @@ class Coach:
 
     @property
     def _session(self) -> str:
-        """What decides a coaching; another model, critic, limit or repository begins anew."""
+        """Settings that decide a coaching; another model, critic, limit or repository begins anew."""
         parts = [
             COACHING_VERSION,
             COACHED_PROMPT_VERSION,
@@ -417,7 +417,7 @@ class Coach:
         return ended
 
     def _ended(self, item: Item) -> Coached | None:
-        """How an item ended in an earlier session; None when it did not, or may go on with more rounds."""
+        """Ending of an item in an earlier session; None when it did not, or may go on with more rounds."""
         row = self._log.rows.get(self._key(item, "end"))
         if row is None:
             return None
@@ -438,7 +438,7 @@ async def _close(planner: Planner) -> None:
 
 
 def spent(rows: Iterable[Row]) -> Usage:
-    """What the plans and descriptions in a coaching's rows cost."""
+    """Cost of the plans and descriptions in a coaching's rows."""
     usages = [
         usage for row in rows if row.get("plan") for usage in (row["plan"]["usage"], row.get("description_usage"))
     ]

@@ -1,4 +1,4 @@
-"""Who says how a drive was: a person at the terminal, or the benchmark's evaluator, whose verdict is put into words.
+"""Critics of a drive: a person at the terminal, or the benchmark's evaluator, whose verdict is put into words.
 
 The evaluator's critic knows the task and what could be seen of the drive, and nothing else: no cause inside the
 simulator, and nothing of what would have happened. Wherever a result rests on it, that is said (`CRITIC_LABELS`).
@@ -37,18 +37,18 @@ class Attempt:
 
     @property
     def must_refuse(self) -> bool:
-        """Whether the right answer to this item's wish is to decline it."""
+        """True if the right answer to this item's wish is to decline it."""
         return self.item.scenario.goal.get("type") == "RefuseEval"
 
     @property
     def refusal(self) -> str:
-        """Why it was not driven; empty when it was."""
+        """Reason it was not driven; empty when it was."""
         return declined(self.recorded.trip.plan, self.recorded.trip.verdicts)
 
 
 @dataclass(frozen=True, slots=True)
 class CriticJudgement:
-    """What a critic decides.
+    """A critic's decision.
 
     Attributes:
         kind: `keep` the program, `critique` it, `skip` the item, or `stop` coaching.
@@ -66,7 +66,7 @@ class Critic(Protocol):
 
     @property
     def judge_id(self) -> Judge:
-        """Who it is; stands in every program it lets pass, and in every result of those."""
+        """Identity of the critic; stands in every program it lets pass, and in every result of those."""
         ...
 
     def judge(self, attempt: Attempt) -> CriticJudgement:
@@ -130,7 +130,7 @@ class PersonCritic:
 
 
 def _not_to_be_kept(attempt: Attempt, wanted: str) -> str:
-    """Why an attempt cannot be kept on this word, as the next question; empty when it can."""
+    """Reason an attempt cannot be kept on this word, as the next question; empty when it can."""
     if attempt.refusal:
         return "Nothing was driven, so there is nothing to keep. Say what to do better, or: skip, quit"
     if attempt.recorded.trip.outcome in ("collision", "off_road"):
@@ -141,7 +141,7 @@ def _not_to_be_kept(attempt: Attempt, wanted: str) -> str:
 
 
 def evaluator_words(attempt: Attempt) -> str:
-    """What was wrong with an attempt, as the evaluator saw it."""
+    """Faults of an attempt, as the evaluator saw it."""
     trip = attempt.recorded.trip
     if trip.plan.refusal:
         return f"The wish was declined ({trip.plan.refusal}), but it can be tried here. Write a program."
@@ -220,7 +220,7 @@ def _overtake(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
 
 
 def _lane_words(side: str, seen: SeenCommands) -> tuple[str, ...]:
-    """What kept the ego out of the lane beside its first one; empty when it was there in the end."""
+    """Sentences on why the ego was not in the lane beside its first one; empty when it was there in the end."""
     sign = 1 if side == "right" else -1
     if seen.side == sign:
         return ()

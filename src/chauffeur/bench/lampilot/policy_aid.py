@@ -75,12 +75,12 @@ class PolicyAid:
 
     @property
     def id(self) -> str:
-        """What decides its requests besides item and limits: prompt version, number offered, the frozen programs."""
+        """Identity of its requests besides item and limits: prompt version, number offered, the frozen programs."""
         return f"{COACHED_PROMPT_VERSION}/{self._k}/{self._repository.digest}"
 
     @property
     def programs(self) -> int:
-        """How many programs the repository holds."""
+        """Number of programs in the repository."""
         return len(self._repository.entries)
 
     @property
@@ -95,7 +95,7 @@ class PolicyAid:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What must be said wherever a result of these requests is shown."""
+        """Caveats to show with every result of these requests."""
         digest = self._repository.digest[:12]
         learned = f"learned on {len(self.coached_items)} items, which are not held out where they are scored"
         return (f"policy repository {digest}: {self.programs} programs, {learned}", *self._repository.labels)

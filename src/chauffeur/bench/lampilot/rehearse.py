@@ -32,7 +32,7 @@ MAX_TRY_S = 70.0
 _PASS_S = 0.11
 """A car that is passed is at most a control period away just before, and to overtake is to pass."""
 _EVERY_TICKS = 5
-"""How often a try's ceiling is computed."""
+"""Ticks between two computations of a try's ceiling."""
 
 
 class OriginJudge(GoalJudge):

@@ -171,7 +171,7 @@ _COST: Final = (
 
 
 def answers_note(rows: Sequence[AnyRow]) -> str:
-    """How many answers were right, where some wishes are to be declined; empty where none is."""
+    """Count of right answers, where some wishes are to be declined; empty where none is."""
     to_refuse = [row for row in rows if row.get("to_refuse")]
     if not to_refuse:
         return ""

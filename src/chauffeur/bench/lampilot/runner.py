@@ -23,7 +23,7 @@ from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 EXPERT_LABEL = "scripted expert: told the goal, reads no words"
-"""What must be said wherever a row of the expert is shown."""
+"""Caveat to show with every row of the expert."""
 SHIELD_LABEL = f"{SHIELD_VERSION} has the last word"
 
 

@@ -59,7 +59,7 @@ def _nearest(road: RoadPerception, now: Instant) -> VehicleState | None:
 
 
 STOP_ZONE_M = 15.0
-"""Where a stop for a stop sign counts: this far before it, the ego's centre."""
+"""Range in which a stop for a stop sign counts: this far before it, the ego's centre."""
 
 
 @dataclass(frozen=True, slots=True)

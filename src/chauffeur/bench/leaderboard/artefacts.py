@@ -1,4 +1,4 @@
-"""What a finished run leaves beside its rows: the official results file, and a map of each route."""
+"""Artefacts of a finished run beside its rows: the official results file, and a map of each route."""
 
 from __future__ import annotations
 

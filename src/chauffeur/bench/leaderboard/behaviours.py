@@ -35,12 +35,12 @@ class Behaviour(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether it is over; its road users are gone by then."""
+        """True if it is over; its road users are gone by then."""
         ...
 
     @property
     def disturbance(self) -> Command | None:
-        """What is added to the ego's command."""
+        """Addition to the ego's command."""
         ...
 
     def update(self, observation: Observation) -> None:
@@ -50,7 +50,7 @@ class Behaviour(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Site:
-    """Where a scenario is set off, and with what."""
+    """Place at which a scenario is set off, and what it works with."""
 
     placed: Placed
     track: RouteTrack
@@ -64,7 +64,7 @@ class _Site:
 
     @property
     def station_m(self) -> float:
-        """Where along the way its trigger lies."""
+        """Position of its trigger along the way."""
         return self.placed.station_m(self.track)
 
     def junction(self) -> int:
@@ -250,7 +250,7 @@ class Obstacle(_Running):
     AHEAD_M: Final = 50.0
     BEYOND_M: Final = 15.0
     SOURCE_M: Final = 60.0
-    """Where the oncoming cars begin, beyond the obstacle."""
+    """Distance beyond the obstacle at which the oncoming cars begin."""
     FLOW_M: Final = 200.0
     FLOW_MPS: Final = 5.56
     GAP_M: Final = 40.0
@@ -371,7 +371,7 @@ def set_off(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rn
 
 
 def reached(placed: Placed, observation: Observation) -> bool:
-    """Whether the ego sets off a scenario."""
+    """True if the ego sets off a scenario."""
     pose, ego = placed.trigger.pose, observation.ego
     return math.hypot(pose.x_m - ego.x_m, pose.y_m - ego.y_m) < REACHED_M
 
@@ -462,7 +462,7 @@ _MAKERS: Final[Mapping[int, Callable[[_Site], Behaviour]]] = {
 
 
 def _edges(road: RoadGraph, lane: Lane, at: Pose) -> tuple[float, float]:
-    """How far the edge of the roadway lies to the right and to the left of a pose on a lane, m.
+    """Distances to the edge of the roadway, right and left of a pose on a lane, m.
 
     To the left the lanes of the other direction belong to it, as far as they lie right beside.
     """

@@ -255,7 +255,7 @@ class LeaderboardBenchmark(Unasked):
         return self._routes[item.route]
 
     def _map_hash(self, town: str) -> str:
-        """What a town was built from; empty where it is not there (yet)."""
+        """Hash of the source that a town was built from; empty where it is not there (yet)."""
         if town not in self._maps:
             try:
                 self._maps[town] = load(town).source_hash
@@ -323,7 +323,7 @@ class LeaderboardBenchmark(Unasked):
 
 
 def _seeds(given: int | str) -> tuple[int, ...]:
-    """How many seeds from 0 on, or a list of them with commas between. Raises ConfigError: neither."""
+    """Read a number of seeds from 0 on, or a list of seeds with commas. Raises ConfigError: neither."""
     said = str(given).strip()
     found: tuple[int, ...] = ()
     if _SEEDS.fullmatch(said):

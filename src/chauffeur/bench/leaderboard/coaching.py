@@ -73,7 +73,7 @@ class Apprentice:
 
 @dataclass(frozen=True, slots=True)
 class TownLesson:
-    """What coaching on a lesson came to: its attempts, the words on the last one, and the name of what was kept."""
+    """Outcome of coaching on a lesson: its attempts, the words on the last one, and the name of what was kept."""
 
     lesson: Lesson
     attempts: int

@@ -61,12 +61,12 @@ class Criterion(Protocol):
     """A rule that watches a route."""
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """What was broken at this instant."""
+        """Infractions at this instant."""
         ...
 
 
 class RouteCompletion:
-    """How far the ego has come: the last point passed, looked for two points ahead."""
+    """Progress of the ego: the last point passed, looked for two points ahead."""
 
     WINDOW: Final = 2
     NEAR_M: Final = 10.0
@@ -227,7 +227,7 @@ class RedLights:
     TAIL: Final = 0.8
     """Of half the length: where the tail begins."""
     BEHIND_M: Final = 1.0
-    """How far behind the rear bumper it ends."""
+    """Distance behind the rear bumper at which it ends."""
     HALF_WIDTH: Final = 0.4
     """Of the lane's width: what counts of a stop line, to either side."""
 
@@ -381,7 +381,7 @@ class OutsideLanes:
         return ()
 
     def finish(self, observation: Observation) -> Sequence[Infraction]:
-        """What is said at the end of the route."""
+        """Findings at the end of the route."""
         if self._wrong_m <= 0.0:
             return ()
         text = (
@@ -442,7 +442,7 @@ class RouteReferee:
         self.done = False
 
     def update(self, observation: Observation) -> list[Infraction]:
-        """What was broken at this instant, nothing after the end; `done` is set where the route has ended."""
+        """Infractions at this instant, none after the end; `done` is set where the route has ended."""
         if self.done:
             return []
         found = [one for criterion in self._criteria for one in criterion.update(observation)]
@@ -478,7 +478,7 @@ def _station(sign: Sign, lane: Lane) -> float:
 
 
 def _past_line(sign: Sign, road: RoadGraph, ego: VehicleState) -> float:
-    """How far the centre of the ego is beyond the line of a sign, along the sign's own lane, m."""
+    """Distance of the ego's centre beyond the line of a sign, along the sign's own lane, m."""
     lane = min(
         (road[name] for name in sign.lanes if name in road),
         key=lambda one: abs(one.centre.project(ego.x_m, ego.y_m)[1]),
@@ -492,7 +492,7 @@ def _away(ego: VehicleState, lane: Lane, place: LanePlace) -> float:
 
 
 def _crosses(one: Line, other: Line) -> bool:
-    """Whether two legs cross or touch."""
+    """True if two legs cross or touch."""
 
     def side(line: Line, point: tuple[float, float]) -> float:
         (ax, ay), (bx, by) = line

@@ -79,7 +79,7 @@ class PlannerSpec:
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """What decides its results."""
+        """Settings that decide its results."""
         return (self.name, self.setting, self.digest, self.latency_s)
 
 
@@ -111,7 +111,7 @@ def system_for(
 
 @dataclass(slots=True)
 class PlanningTally:
-    """What planning came to on a route.
+    """Outcome of planning on a route.
 
     Attributes:
         asked: Plans asked for.
@@ -191,7 +191,7 @@ class InstructedDriver:
 
     @property
     def setpoints(self) -> Setpoints:
-        """What the program wants at this instant."""
+        """Demand of the program at this instant."""
         return self._setpoints
 
     def close(self) -> None:
@@ -228,7 +228,7 @@ class InstructedDriver:
         return driver.command(setpoints)
 
     def _turning(self, observation: Observation) -> bool:
-        """Whether the manoeuvre before is still being done: in a junction, with nothing to be done next that near."""
+        """True if the manoeuvre before is still being done: in a junction, with nothing to be done next that near."""
         lane = observation.road.get(observation.ego.lane)
         if lane is None or not lane.junction or self._stage < 0 or self._stood_s > STOOD_S:
             return False

@@ -59,7 +59,7 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True)
 class LessonResult:
-    """What an attempt at a lesson came to.
+    """Outcome of an attempt at a lesson.
 
     Attributes:
         done: Whether it was driven as it was said, without an infraction.

@@ -1,4 +1,4 @@
-"""What is said of a route: our row, and the official results file made of rows."""
+"""Reports of a route: our row, and the official results file made of rows."""
 
 from __future__ import annotations
 

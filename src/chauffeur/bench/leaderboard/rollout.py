@@ -205,7 +205,7 @@ def _driven(job: RouteJob) -> dict[str, Any]:
 
 
 def _is_of_engine(error: Exception) -> bool:
-    """Whether an engine failed: its own exceptions are no class of ours."""
+    """True if an engine failed: its own exceptions are no class of ours."""
     return isinstance(error, ChauffeurError | OSError) or type(error).__module__.partition(".")[0] == "libsumo"
 
 

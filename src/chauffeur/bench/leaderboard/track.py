@@ -17,7 +17,7 @@ from chauffeur.geometry import Pose, wrap_to_pi
 from chauffeur.geometry.route import RoadOption
 
 TURNS: Final[tuple[RoadOption, ...]] = ("left", "straight", "right")
-"""What a way does inside a junction."""
+"""Movements of a way inside a junction."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class RouteTrack:
         return self.poses[-1]
 
     def next_turn(self, index: int) -> RoadOption | None:
-        """What the way does at the next junction from a point on; None where no junction follows."""
+        """Movement of the way at the next junction from a point on; None where no junction follows."""
         at = self.next_junction(index)
         return None if at is None else self.options[at]
 

@@ -1,4 +1,4 @@
-"""Where scenarios are set off: the official trigger files, and which of their points lie on a route.
+"""Triggers of scenarios: the official trigger files, and which of their points lie on a route.
 
 Both published forms are read: one JSON for all towns (Leaderboard 1.0's own: scenarios 1, 3 and 4), and a folder of
 `ScenarioN/TownXX_ScenarioN.json` (transfuser's: 1, 3, 4, 7, 8, 9, 10).
@@ -72,7 +72,7 @@ class Placed:
     turn: RoadOption | None
 
     def station_m(self, track: RouteTrack) -> float:
-        """Where along the way its trigger lies: what it puts on the road is that far from there, not from `index`,
+        """Position of its trigger along the way: what it puts on the road is that far from there, not from `index`,
         the first point near it."""
         at = self.trigger.pose
         return track.stations_m[self.index] + track.poses[self.index].sees(at.x_m, at.y_m)[0]

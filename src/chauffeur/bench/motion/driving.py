@@ -52,7 +52,7 @@ class MotionJob:
 
 
 def job_key(scenario: Scenario, answer: Row) -> str:
-    """What decides a drive: scene, gains, versions."""
+    """Settings that decide a drive: scene, gains, versions."""
     parts = [DRIVE_VERSION, SCORE_VERSION, scenario_hash(scenario), answer["policy"], answer["refusal"]]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 

@@ -1,4 +1,4 @@
-"""What is asked: commands with the style that is meant, and the gains that styles stand for."""
+"""Items: commands with the style that is meant, and the gains that styles stand for."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from chauffeur.worlds.track.dynamics import Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
 
 Told = Literal["told", "hidden", "wrong"]
-"""What a planner hears of the weather: as it is, nothing, or that of another weather (a control)."""
+"""Weather told to a planner: as it is, nothing, or that of another weather (a control)."""
 
 Shown = Literal["off", "on", "black", "other"]
-"""What a planner sees: no picture, the front camera's, a black one, or one of another weather (controls)."""
+"""Picture shown to a planner: no picture, the front camera's, a black one, or one of another weather (controls)."""
 _PLACES: Final = 7 << 21
-"""Where the places' seeds begin: none of them is one that a model of ours was trained on."""
+"""First seed of the places: none of them is one that a model of ours was trained on."""
 
 TASK: Final[dict[ManoeuvreName, str]] = {
     "acceleration": "The manoeuvre is to accelerate to 50 km/h behind the vehicle ahead.",
@@ -41,7 +41,7 @@ _OTHER: Final[dict[Weather, Weather]] = {
 
 @dataclass(frozen=True, slots=True)
 class MotionCommand:
-    """What a passenger says of a manoeuvre.
+    """A passenger's command about a manoeuvre.
 
     Attributes:
         id: E.g. `left_turn.c03`.
@@ -74,7 +74,7 @@ class MotionItem:
 
     @property
     def scenario(self) -> Scenario:
-        """Where it is driven."""
+        """Place where it is driven."""
         return track_scenario(self.command.manoeuvre, self.weather, self.plant, self.seed)
 
     def shown(self, shown: Shown) -> tuple[CameraImage, ...]:

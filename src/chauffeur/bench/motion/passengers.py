@@ -46,7 +46,7 @@ _BIT: Final = 1.25
 
 @dataclass(frozen=True, slots=True)
 class RidingTaste:
-    """How one passenger wants to be driven.
+    """One passenger's preferences in driving.
 
     Attributes:
         who: Pseudonym, temper and talk.
@@ -83,14 +83,14 @@ def draw_manners(count: int, seed: int) -> tuple[RidingTaste, ...]:
 
 
 def wanted(manner: RidingTaste, style: Style, weather: Weather, day: float) -> float:
-    """How careful a passenger wants the gains, 0 to 1. `day` is a standard normal draw."""
+    """Caution that a passenger wants of the gains, 0 to 1. `day` is a standard normal draw."""
     moved = manner.taste + manner.caution * CAUTION[weather] + manner.noise * day
     return float(np.clip(meant()[style] + moved, 0.0, 1.0))
 
 
 @cache
 def meant() -> Mapping[str, float]:
-    """How careful the middle of each style's range is. Raises DataError: the ranges cannot be read."""
+    """Caution at the middle of each style's range. Raises DataError: the ranges cannot be read."""
     found: dict[str, float] = {}
     for style, ranges in style_ranges().items():
         ends = [[ranges[name][end] for name in ("kp", "ki", "kd", "wl", "wh", "ws")] for end in (0, 1)]
@@ -102,7 +102,7 @@ def meant() -> Mapping[str, float]:
 def judged(
     manner: RidingTaste, want: float, policy: ActionMatrix | None, outcome: str, task: ManoeuvreName
 ) -> Judgement:
-    """What a passenger makes of a drive: gains that are too careful deviate upwards, too bold ones downwards.
+    """A passenger's verdict on a drive: gains that are too careful deviate upwards, too bold ones downwards.
 
     `policy` is None where nothing was driven.
     """

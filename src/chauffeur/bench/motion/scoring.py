@@ -46,7 +46,7 @@ WEIGHTS: Final[Mapping[str, Mapping[str, float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class MotionStatistics:
-    """What is measured of a drive; x is along the car, y across it (Tab. XI).
+    """Measures of a drive; x is along the car, y across it (Tab. XI).
 
     Attributes:
         min_ttc_s: Smallest time to collision on present courses, up to 10 s; None where all missed each other.

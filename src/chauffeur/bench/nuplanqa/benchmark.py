@@ -177,7 +177,7 @@ questions about our own scenes are written by the generator that also makes the 
 
     @property
     def variant(self) -> str:
-        """What the default run folder's name says of the options."""
+        """Options as the default run folder's name shows them."""
         return "" if self._control == "pictures" else self._control
 
     def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:

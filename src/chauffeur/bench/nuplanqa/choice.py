@@ -148,7 +148,7 @@ _CORRECTED: Final = re.compile(
     rf"(?=\s{{0,3}}(?:[.!;,)]|it is\b|is (?:right|correct)|$))",
     re.IGNORECASE | re.MULTILINE,
 )
-"""What a model that takes back its answer says instead."""
+"""Words of a model that takes its answer back."""
 _ORDINALS: Final = (
     "first|1st|one|1|i",
     "second|2nd|two|2|ii",

@@ -298,7 +298,7 @@ class OpenLoopBenchmark:
 
     @property
     def variant(self) -> str:
-        """What the default run folder's name says of the options."""
+        """Options as the default run folder's name shows them."""
         return "-".join(one for one in (self._setting, self._shown) if one not in ("zero-shot", "pictures"))
 
     def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:

@@ -228,7 +228,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
 
     @property
     def variant(self) -> str:
-        """What the default run folder's name says of the options."""
+        """Options as the default run folder's name shows them."""
         return "-".join(["instructed", *([super().variant] if super().variant else [])])
 
     def conclude(self, folder: Path, rows: Sequence[Row], results: Mapping[str, Row | None]) -> Sequence[str]:

@@ -12,12 +12,12 @@ from chauffeur.planners.prompts import Setting
 
 
 def run_config(planner: str, setting: Setting) -> RunConfig:
-    """What decides a run over all wishes. Raises DataError: the wishes are damaged."""
+    """Settings that decide a run over all wishes. Raises DataError: the wishes are damaged."""
     return RunConfig(planner, setting, as_dataset().sha256, 0, 0, LAMPILOT_LIMITS, asked="passengers")
 
 
 def requests_of(setting: Setting) -> PassengerRequests:
-    """What a planner is asked under a prompt setting."""
+    """Requests to a planner under a prompt setting."""
     return PassengerRequests(PlainRequests.of(setting, LAMPILOT_LIMITS), load_wishes())
 
 

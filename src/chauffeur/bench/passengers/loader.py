@@ -75,7 +75,7 @@ _GOALS: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class PastWish:
-    """What memory holds of an earlier trip.
+    """Memory record of an earlier trip.
 
     Attributes:
         instruction: Words of the wish then.
@@ -184,7 +184,7 @@ def _bad(number: int, fault: str) -> DataError:
 
 
 def _fault(wish: PassengerWish) -> str:
-    """What is wrong with a wish beyond the types of its fields; empty when nothing is."""
+    """Faults of a wish beyond the types of its fields; empty when nothing is."""
     if not wish.wish.strip():
         return "the wish is empty"
     if wish.scenario not in SCENES:

@@ -1,4 +1,4 @@
-"""What a planner is asked for a wish of the set: the plain request, with the passenger's earlier trips as H."""
+"""Requests to a planner for a wish of the set: the plain request, with the passenger's earlier trips as H."""
 
 from __future__ import annotations
 

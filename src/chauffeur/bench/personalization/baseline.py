@@ -132,7 +132,7 @@ class KeywordParameters:
         return "", ""
 
     def _place(self, text: str) -> tuple[str, str] | None:
-        """Where to park; the published rules take the nearest spot where none is named."""
+        """Choose where to park; the published rules take the nearest spot where none is named."""
         if not self._fair:
             for place, words in (("nearest", self._words.nearest), ("stadium", self._words.stadium)):
                 if word := self._found(words, text):
@@ -157,6 +157,6 @@ class KeywordParameters:
         return ""
 
     def _complains(self, word: str, text: str) -> bool:
-        """Whether the fair rules take it for a complaint: too fast, so slow."""
+        """True if the fair rules take it for a complaint: too fast, so slow."""
         even = text.lower()
         return self._fair and any(_TOO.search(even[: match.start()]) for match in re.finditer(re.escape(word), even))

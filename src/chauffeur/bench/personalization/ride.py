@@ -61,7 +61,7 @@ _driven: OrderedDict[tuple[str, str], tuple[Episode, Trace]] = OrderedDict()
 
 @dataclass(frozen=True, slots=True)
 class Ride:
-    """What came of a trip.
+    """Outcome of a trip.
 
     Attributes:
         trip: As it is filed.
@@ -155,7 +155,7 @@ def ride_policy(policy: Policy, task: Task, scene: Scenario, limits: Limits) -> 
 
 
 def as_it_was(world: World, task: Task) -> Parameters:
-    """What drives on where a wish is declined: the present speed, the present lane."""
+    """Parameters that drive on where a wish is declined: the present speed, the present lane."""
     return usual(task, world.observe().ego.speed_mps)
 
 
@@ -189,7 +189,7 @@ def _referee(world: World, policy: Policy) -> Referee | None:
 
 
 def _stand(world: World, scene: Scenario) -> tuple[str, dict[str, float]]:
-    """Where the car stands in a lot, and how much farther that is from each place than need be.
+    """Position of the car in a lot, and its excess distance from each place.
 
     From the stadium on foot, from the exit by car, and from the entrance along the way driven.
     """

@@ -1,4 +1,4 @@
-"""What the simulated passengers say: wishes at three levels of directness (paper Tab. VII), and feedback on a drive.
+"""Sayings of the simulated passengers: wishes at three levels of directness (paper Tab. VII), and feedback on a drive.
 
 The words are two halves of the same shape, tables in `data/personalization` with a sentence a line: what it is, for
 what, the sentence, its writer. `tuning` was written by the authors of the planner and may be looked at while a planner
@@ -28,13 +28,13 @@ Aim = Literal[
     "overtake", "follow", "right_lane", "yield", "go",
     "park.nearest", "park.stadium", "park.exit", "pace.faster", "pace.slower",
 ]  # fmt: skip
-"""What a passenger is after; the parts behind the dot are their own choice."""
+"""Aims of a passenger; the parts behind the dot are their own choice."""
 
 Topic = Literal[
     "too_fast", "too_slow", "too_close", "harsh", "swerving", "close_call", "no_overtake", "passed", "not_right",
     "waited", "not_parked", "wrong_spot", "parked", "fine",
 ]  # fmt: skip
-"""What a passenger has to say of a drive."""
+"""Remarks of a passenger on a drive."""
 Force = Literal["bit", "plain", "much"]
 
 
@@ -81,7 +81,7 @@ def wishes_of(aim: Aim, level: Level, half: Half) -> tuple[str, ...]:
 
 
 def feedback_of(topic: Topic, force: Force, half: Half) -> tuple[str, ...]:
-    """What can be said in the words of one half; plainly where nothing is written for that force."""
+    """Sayings in the words of one half; plainly where nothing is written for that force."""
     table = feedback()[half]
     return table.get((topic, force)) or table[topic, "plain"]
 

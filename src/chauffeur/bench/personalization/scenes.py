@@ -1,4 +1,4 @@
-"""Where the wishes of this evaluation are driven: seven kinds of situation on highway, intersection and parking lot.
+"""Scenes of this evaluation: seven kinds of situation on highway, intersection and parking lot.
 
 The seeds were chosen by what the first instant shows (a slower car 42 m to 50 m ahead, at its own speed, with a free
 lane beside it; room on the right; traffic that crosses), never by what a planner makes of it;
@@ -14,7 +14,7 @@ from chauffeur.bench.personalization.sayings import Aim
 from chauffeur.concept import Scenario
 
 Task = Literal["overtake", "follow", "right_lane", "yield", "go", "park", "pace"]
-"""What a passenger wants on the whole (paper Tab. VIII and IX; `pace` is the speed in a lot, Tab. X)."""
+"""Overall wants of a passenger (paper Tab. VIII and IX; `pace` is the speed in a lot, Tab. X)."""
 Ground = Literal["highway", "intersection", "parking"]
 
 _TASKS: Final[dict[Task, tuple[Ground, str, tuple[Aim, ...], float, tuple[int, ...]]]] = {

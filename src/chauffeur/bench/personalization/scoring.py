@@ -23,7 +23,7 @@ SCORE_VERSION: Final = "talk2drive-score-v1"
 
 @dataclass(frozen=True, slots=True)
 class TripStatistics:
-    """What is measured of a drive.
+    """Measures of a drive.
 
     Attributes:
         min_ttc_s: Smallest time to collision; None where nobody was ever closed in on.

@@ -1,4 +1,4 @@
-"""What one simulated passenger does for one task: trips with every system in blind order, and a profile that grows.
+"""Study of one simulated passenger and task: trips with every system in blind order, and a profile that grows.
 
 For each level of directness the passenger says the same words on the same scene to every system and judges each drive
 without knowing whose it is. The system with memory has learnt from trips before: the same task, other words, other
@@ -54,13 +54,13 @@ _LIMITS: Final = Limits()
 
 
 def arms_of(task: Task) -> tuple[Arm, ...]:
-    """Who drives. The published rules know only spots in a lot, so they are not asked about the speed there."""
+    """Systems that drive. The published rules know only spots in a lot, so they are not asked about the speed there."""
     return tuple(arm for arm in ARMS if task != "pace" or arm != "keyword")
 
 
 @dataclass(frozen=True, slots=True)
 class StudyConfig:
-    """What decides a run.
+    """Settings that decide a run.
 
     Attributes:
         passengers: How many simulated people.
@@ -113,7 +113,7 @@ class StudyJob:
 
 
 def versions() -> dict[str, str]:
-    """What decides a study beside its configuration."""
+    """Versions that decide a study beside its configuration."""
     return {
         "bench": BENCH_VERSION,
         "population": POPULATION_VERSION,
@@ -187,7 +187,7 @@ class _Sitting:
         return _Day(Mood(job.task, aim, level, pace), scene, words[int(rng.integers(len(words)))])
 
     def _ideal(self, day: _Day) -> Parameters:
-        """What the passenger would choose, who knows what they want."""
+        """Choice that the passenger, who knows what they want, would make."""
         mood = day.mood
         _, limit = _start(mood.task, day.scene.id)
         step = 0.5 if GROUND_OF[mood.task] == "highway" else 0.25  # as exactly as anybody sets a speed

@@ -1,4 +1,4 @@
-"""When a passenger takes over: a pure function of a drive and of what the passenger likes, and what they say then.
+"""Takeover by a passenger: a pure function of a drive and of what the passenger likes, and what they say then.
 
 A passenger takes over when the car does not do what they meant within their patience, when it is faster or slower than
 they like beyond their tolerance, or when it is closer, harsher or tighter than they put up with. It is the first of
@@ -26,7 +26,7 @@ _PATIENCE: Final[dict[Ground, float]] = {"highway": 1.0, "intersection": 0.35, "
 _MIND: Final = 0.3
 """Share of the patience for which a wrong speed must last."""
 _HELD_UP_S: Final = 5.0
-"""Who is no more than this behind another counts as following (Highway Capacity Manual, 1985)."""
+"""Time gap up to which a vehicle counts as following another (Highway Capacity Manual, 1985)."""
 _FALLS_BACK_MPS: Final = 1.5
 _NEAR_M: Final = 12.0
 _BEND: Final = 0.04
@@ -53,7 +53,7 @@ _SPEAKS: Final[dict[Talk, float]] = {"silent": 0.0, "brief": 0.5, "open": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class Mood:
-    """What a passenger wants of one trip.
+    """A passenger's wants for one trip.
 
     Attributes:
         task: What for.
@@ -70,7 +70,7 @@ class Mood:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a passenger made of a drive.
+    """A passenger's verdict on a drive.
 
     Attributes:
         takes_over: Whether they took over.
@@ -100,7 +100,7 @@ def wanted_mps(passenger: Passenger, mood: Mood, limit_mps: float) -> float:
 
 
 def aim_of(passenger: Passenger, task: Task, choice: int, start_mps: float, limit_mps: float) -> Aim:
-    """What exactly they are after: a place by choice, a direction by how fast they want to go."""
+    """The exact aim: a place by choice, a direction by how fast they want to go."""
     match task:
         case "park":
             return ("park.nearest", "park.stadium", "park.exit")[choice % 3]
@@ -112,7 +112,7 @@ def aim_of(passenger: Passenger, task: Task, choice: int, start_mps: float, limi
 
 
 def judge(trace: Trace, passenger: Passenger, mood: Mood) -> Judgement:
-    """What a passenger made of a drive."""
+    """A passenger's verdict on a drive."""
     events = sorted(_events(trace, passenger, mood), key=lambda event: event[0])
     if events:
         index, topic, off = events[0]
@@ -197,7 +197,7 @@ def _off(trace: Trace, passenger: Passenger, mood: Mood) -> tuple[Array, Flags]:
 
 
 def _excused(trace: Trace, wanted: float) -> Flags:
-    """Where a low speed has a reason that can be seen: somebody slower ahead, a stop sign, a bend, pulling away."""
+    """Instants at which a low speed has a visible reason: a slower agent ahead, a stop sign, a bend, pulling away."""
     follows = (trace.gap_m < _HELD_UP_S * trace.speed) & (trace.lead_speed < wanted)
     held_up = follows & (trace.speed > trace.lead_speed - _FALLS_BACK_MPS)
     near = (trace.gap_m < _NEAR_M) | (trace.somebody_m < _NEAR_M)

@@ -80,11 +80,11 @@ class Trace:
 
     @property
     def seconds(self) -> float:
-        """How long it took, s."""
+        """Duration, s."""
         return len(self.speed) * self.dt_s
 
     def statistics(self) -> TripStatistics:
-        """What the driving score is made of. Raises ScenarioError for a drive that was over at once."""
+        """Compute the parts of the driving score. Raises ScenarioError for a drive that was over at once."""
         closing = [float(value) if math.isfinite(value) else None for value in self.ttc_s]
         return statistics_of(self.speed.tolist(), self.acceleration.tolist(), closing, self.dt_s)
 

@@ -1,4 +1,4 @@
-"""Whether what passengers say is done: labelled commands driven in staged scenes, judged by geometry."""
+"""Checks that commands are carried out: labelled commands driven in staged scenes, judged by geometry."""
 
 from chauffeur.bench.realization.benchmark import RealizationBenchmark, realization
 from chauffeur.bench.realization.highway import highway_scenario

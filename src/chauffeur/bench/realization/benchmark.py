@@ -53,7 +53,7 @@ _ON: Final[Mapping[str, str]] = {
     "town": "def go():\n    while True:\n        yield proceed(check_speed_limit())\n",
     "highway": "def go():\n    while True:\n        yield autopilot()\n",
 }
-"""What the blind reader drives, whatever was said."""
+"""Plan that the blind reader drives, whatever was said."""
 WORLDS: Final = tuple(_ON)
 MAX_S: Final = 120.0
 """Simulated time of a drive: red lights, a crossing and three junctions."""
@@ -176,7 +176,7 @@ def _came(results: Sequence[str]) -> Came:
 
 @dataclass(frozen=True, slots=True)
 class RealizationRow:
-    """What became of a command.
+    """Outcome of a command.
 
     Attributes:
         item: Its id, the same for all readers.

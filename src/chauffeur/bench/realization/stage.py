@@ -40,9 +40,9 @@ _ROW_M: Final = (22.0, 34.0, 46.0)
 _AFTER_TURN_M: Final = (124.0, 108.0)
 """Far enough behind the junction that a distractor leaves room to come out of it."""
 _LEFT_TURN_M: Final = 10.0
-"""How much longer the way over a junction is to the left."""
+"""Extra length of the way over a junction to the left."""
 _SECOND_TURN_M: Final = 98.0
-"""How much farther it is behind a second turn."""
+"""Extra distance behind a second turn."""
 _VERBS: Final = frozenset(
     {
         "follow", "pass", "avoid", "yield", "stop", "park", "pull_over", "wait", "go", "turn", "straight", "lane",
@@ -69,7 +69,7 @@ _UNMOVING: Final[frozenset[StagedKind]] = frozenset({"static", "obstacle"})
 
 @dataclass(slots=True)
 class CommandScene:
-    """Where a command is said.
+    """Scene in which a command is said.
 
     Attributes:
         start: Lane and station at which the ego begins.
@@ -95,12 +95,12 @@ class CommandScene:
 
     @property
     def side_street(self) -> bool:
-        """Whether it begins on a street of one lane each way."""
+        """True if it begins on a street of one lane each way."""
         return self.start in SIDE_STREETS.values()
 
     @property
     def has_kerb(self) -> bool:
-        """Whether there is a kerb beside the lane in which it begins."""
+        """True if there is a kerb beside the lane in which it begins."""
         return self.start not in (LEFT_LANE, ENDS["left"], FAR["left"])
 
 
@@ -122,7 +122,7 @@ def stage_of(acts: Sequence[Act]) -> CommandScene | None:
 
 
 def _starts(acts: Sequence[Act]) -> tuple[Start, ...]:
-    """Where the acts can be begun, the likeliest first."""
+    """Places where the acts can be begun, the likeliest first."""
     turns = [act for act in acts if act.act in ("turn", "straight") and not act.negated]
     side: Side | None = next((act.side for act in turns if act.act == "turn"), None)
     turned = next((k for k, act in enumerate(acts) if act.act == "turn" and not act.negated), len(acts))
@@ -146,13 +146,13 @@ def _starts(acts: Sequence[Act]) -> tuple[Start, ...]:
 
 
 def _counts(act: Act) -> bool:
-    """Whether an act names a junction by a number."""
+    """True if an act names a junction by a number."""
     held = (None if act.place is None else act.place.ref, None if act.when is None else act.when.ref)
     return any(one is not None and one.kind in _COUNTED and (one.ordinal or 1) > 1 for one in held)
 
 
 def _too_far(act: Act) -> bool:
-    """Whether an act names a junction beyond those that a town has in a row."""
+    """True if an act names a junction beyond those that a town has in a row."""
     reference = None if act.place is None else act.place.ref
     return reference is not None and reference.kind in _COUNTED and (reference.ordinal or 1) > _MOST_COUNTED
 
@@ -191,7 +191,7 @@ def _staged(acts: Sequence[Act], start: Start) -> CommandScene:
 
 
 def _can_change(scene: CommandScene, act: Act, way: tuple[Turn, ...], changed: int) -> bool:
-    """Whether there is the lane that an act names. A turn from a side street leads into the lane on its own side."""
+    """True if there is the lane that an act names. A turn from a side street leads into the lane on its own side."""
     side = _lane_side(act)
     if act.to == "original":
         return changed > 0
@@ -375,5 +375,5 @@ def _distract(scene: CommandScene, reference: Reference, actor: StagedActor, rol
 
 
 def _may_be(reference: Reference, kind: StagedKind, colour: Colour | None) -> bool:
-    """Whether a reference could mean something of a kind and colour; one that is drawn may be any."""
+    """True if a reference could mean something of a kind and colour; one that is drawn may be any."""
     return _KINDS.get(reference.kind) == kind and (None in (reference.colour, colour) or reference.colour == colour)

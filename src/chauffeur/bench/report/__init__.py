@@ -1,1 +1,1 @@
-"""What came of benchmark runs, as tables, comparisons and a gallery: numbers and words, drawn elsewhere."""
+"""Results of benchmark runs, as tables, comparisons and a gallery: numbers and words, drawn elsewhere."""

@@ -25,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 @runtime_checkable
 class HasRulers(Protocol):
-    """What a class of benchmarks offers beyond its tables where what is stored can be scored in several ways."""
+    """Optional part of a benchmark class whose stored rows can be scored in several ways."""
 
     @staticmethod
     def rescored(run: Run, ruler: str) -> Run:
@@ -35,7 +35,7 @@ class HasRulers(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What a report is asked for.
+    """Options of a report.
 
     Attributes:
         metrics: Name of a ruler, for benchmarks that have several; empty takes the one that the runs agree on.
@@ -184,7 +184,7 @@ def _beyond(
 
 
 def _facts(run: Run) -> tuple[tuple[str, str], ...]:
-    """Where a run's figures come from, as (name, value); what is not known is left out."""
+    """Origin of a run's figures, as (name, value); what is not known is left out."""
     row, known = run.rows[0], run.provenance
     versions = cast("dict[str, Any]", known.get("versions") or {})
     found: list[tuple[str, Any]] = [

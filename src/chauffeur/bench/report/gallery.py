@@ -24,7 +24,7 @@ MakeCard = Callable[[AnyRow], Card]
 
 @runtime_checkable
 class ShowsItems(Protocol):
-    """What a class of benchmarks offers beyond its tables where it can show more of an item than its row."""
+    """Optional part of a benchmark class that can show more of an item than its row."""
 
     @staticmethod
     def cards(run: Run, data: Path | None) -> MakeCard:

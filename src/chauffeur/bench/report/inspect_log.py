@@ -159,7 +159,7 @@ def _sample(run: Run, spec: TableSpec, row: AnyRow, number: int, stored: dict[st
 
 
 def _reply(plan: dict[str, Any]) -> str:
-    """What was answered, of a stored plan or stored words."""
+    """Text of the answer in a stored plan or stored words."""
     policy: Any = plan.get("policy") or {}
     source = policy.get("source", "") if isinstance(policy, dict) else ""
     parts = [(plan.get("thoughts") or {}).get("text", ""), plan.get("refusal", ""), plan.get("text", "")]

@@ -26,12 +26,12 @@ _SHORT = 80
 
 
 def asked_words(row: Mapping[str, Any]) -> str:
-    """What was asked in a row, in the words it has; else its item."""
+    """Words that a row's item asked with; its id where the row has none."""
     return next((str(row[name]) for name in _ASKED if row.get(name)), str(row["item"]))
 
 
 def ending_words(row: Mapping[str, Any]) -> str:
-    """How a row ended, briefly."""
+    """Short words for a row's ending."""
     found = (str(row[name]) for name in _ENDED if row.get(name))
     return next((text.replace("_", " ") for text in found if len(text) <= _SHORT), "not as it should be")
 

@@ -50,12 +50,12 @@ class Run:
 
     @property
     def planned(self) -> int:
-        """How many items the run was planned for; of a shard, the whole run's."""
+        """Number of items the run was planned for; for a shard, of the whole run."""
         return int(self.plan.get("planned", len(self.plan["items"])))
 
     @property
     def config(self) -> Row:
-        """What decided the run."""
+        """Settings that decided the run."""
         return dict(self.plan.get("config", {}))
 
     @property

@@ -36,7 +36,7 @@ _AMOUNTS: Final[Mapping[str, Verb]] = {
     "km/h": "speed", "mph": "speed", "m/s": "speed", "m": "gap", "ft": "gap", "yd": "gap", "lengths": "gap",
     "s": "gap", "lanes": "lane",
 }  # fmt: skip
-"""What a unit measures, where the turn before does not say otherwise."""
+"""Quantity that a unit measures, where the turn before does not say otherwise."""
 _COUNTED: Final[frozenset[Verb]] = frozenset({"speed", "gap", "lane", "wait"})
 _ENDS_WITH_GO: Final[frozenset[Verb]] = frozenset({"stop", "wait", "park", "pull_over"})
 _ENDS_WITH_CANCEL: Final[frozenset[Verb]] = frozenset({"follow", "pass", "avoid", "yield", "keep", "goto"})

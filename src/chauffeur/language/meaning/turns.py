@@ -65,7 +65,7 @@ _SIDES: Final = ("{}", "the {}", "on the {}", "to the {}", "{} side", "the {} si
 _ORDINALS: Final = {"first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5, "last": -1}
 _AROUND_A_NUMBER: Final = "make it that to at do say i said meant mean want is rather instead lets about"
 _MAKE_IT: Final = frozenset(_AROUND_A_NUMBER.split())
-"""What is said around a number that changes the last one."""
+"""Words around a number that changes the last one."""
 
 
 def _each(phrases: tuple[str, ...], act: Act) -> Iterator[_Phrase]:

@@ -154,7 +154,7 @@ _EVENTS: Final[Mapping[Event, tuple[str, str]]] = {
     "closer": ("is closer than", "it is closer than"),
     "further": ("is further away than", "it is further away than"),
 }
-"""What an event is called with, and without, a reference."""
+"""Names of an event with, and without, a reference."""
 
 
 def condition_words(when: Condition) -> str:

@@ -44,7 +44,7 @@ class BevLlmAnswerer:
 
     @property
     def model(self) -> str:
-        """What it is, with what was kept from it."""
+        """Name of the model, with the inputs it keeps."""
         return f"bev-llm-compact, {self._answerer.keep}"
 
     async def write(self, messages: Sequence[Message]) -> Prose:

@@ -1,4 +1,4 @@
-"""What the compact network's tokens are taught to hold: the class of every family, and the lead vehicle's distance.
+"""Targets of the compact network's tokens: the class of every family, and the lead vehicle's distance.
 
 From four-way questions alone a network that begins with nothing learns slowly: one bit or two a question, through all
 its words. The ground truth of a staged scene says every class outright, and where every road user is; a head on each

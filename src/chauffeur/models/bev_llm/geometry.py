@@ -1,4 +1,4 @@
-"""Where patches of pictures and cells of the bird's-eye view lie: what makes the attention aware of the cameras.
+"""Positions of picture patches and bird's-eye cells: what makes the attention aware of the cameras.
 
 Vehicle frame: x forward, y left, z up, m, at the rig's origin. A patch is known by the ray through its middle, a cell
 by where its column of reference points falls in each picture (the reference points of BEVFormer, as a bias).
@@ -42,7 +42,7 @@ class BevGrid:
 
     @property
     def cells(self) -> int:
-        """How many."""
+        """Number of them."""
         return self.rows * self.columns
 
     def centres(self) -> FloatArray:
@@ -54,7 +54,7 @@ class BevGrid:
 
 @dataclass(frozen=True, slots=True)
 class RigGeometry:
-    """What the attention knows of a rig.
+    """Geometry of a rig, as the attention uses it.
 
     Attributes:
         rays: Of each patch of each view: direction of its middle and place of its camera, (views * patches, 6); places

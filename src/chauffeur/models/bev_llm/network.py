@@ -28,7 +28,7 @@ _FORGOTTEN: Final = 0.2
 
 _LISTS: Final = ("facets", "cross", "size", "channels", "gist")
 Keep = Literal["full", "no-bev", "no-history", "single-view", "blind"]
-"""What a network is given of what it could use: an ablation, in training or at the test alone."""
+"""Inputs that a network keeps: an ablation, in training or at the test alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ class Resampler(nn.Module):
 
 
 class MeaningHead(nn.Module):
-    """What class of what facet a question with an option means, from which words are in the one and in the other.
+    """Class and facet that a question with an option means, from which words are in the one and in the other.
 
     Order is left out on purpose: taught a few wordings of each class, a network that reads in order knows these
     wordings, one that does not knows their words. (With one wording in four kept apart, it understood 85 % of them;
@@ -220,7 +220,7 @@ class CompactBevLlm(nn.Module):
         motion: torch.Tensor,
         keep: Keep = "full",
     ) -> tuple[torch.Tensor, torch.Tensor | None]:
-        """What the decoder attends to.
+        """Vectors that the decoder attends to.
 
         Args:
             now: Views at the present instant, (B, V, 3, H, W) in 0..1.
@@ -258,7 +258,7 @@ class CompactBevLlm(nn.Module):
         motion: torch.Tensor,
         keep: Keep = "full",
     ) -> tuple[torch.Tensor, torch.Tensor | None]:
-        """What the decoder attends to, from the features of `encode`; see `see`."""
+        """Vectors that the decoder attends to, from the features of `encode`; see `see`."""
         if keep == "single-view":
             present = present[:, :FRONT_VIEWS]
         if keep in ("no-history", "no-bev") or not self.config.fusion.history:
@@ -281,7 +281,7 @@ class CompactBevLlm(nn.Module):
     def forward(
         self, tokens: torch.Tensor, words: torch.Tensor, mask: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """How well options fit: how likely what an option means is in the scene, and what the decoder adds to that.
+        """Score options: how likely what an option means is in the scene, and what the decoder adds to that.
 
         Args:
             tokens: From `see`, one row a text, (N, K, hidden).
@@ -372,7 +372,7 @@ class MllamaBevLlm(nn.Module):
     def see(
         self, pixels: torch.Tensor, ratios: torch.Tensor, rig: tuple[torch.Tensor, ...], motion: torch.Tensor
     ) -> torch.Tensor:
-        """What the decoder attends to.
+        """Vectors that the decoder attends to.
 
         Args:
             pixels: (B, T, V, tiles, 3, side, side), as Mllama's image processor makes them.

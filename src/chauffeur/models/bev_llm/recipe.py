@@ -67,7 +67,7 @@ Watch = Callable[[str, int, float, float], None]
 
 @dataclass(frozen=True, slots=True)
 class BevLlmRecipe:
-    """What decides a training.
+    """Settings that decide a training.
 
     Attributes:
         steps: Optimiser steps of perception.
@@ -216,7 +216,7 @@ def _camera(folder: Path, cams: Mapping[str, Any], name: str) -> Camera:
 
 
 def _motion(metadata: Mapping[str, Any], token: str, instants: int) -> tuple[NDArray[np.float32], tuple[float, float]]:
-    """How the ego has moved from the first instant to the last: forward and left in tens of m, turned in rad; and its
+    """Motion of the ego from the first instant to the last: forward and left in tens of m, turned in rad; and its
     speeds at both, m/s."""
     now = before = metadata[token]["ego_pose"]
     at = str(metadata[token].get("prev") or "")
@@ -280,7 +280,7 @@ class CompactAnswerer:
         return self.network.see(shown, before, self._rig, torch.from_numpy(motion), given)
 
     def all_features(self, data: QaTensors, scenes: int = 24) -> tuple[torch.Tensor, torch.Tensor]:
-        """What the encoder gives of all scenes of a split, in half precision: see `CompactBevLlm.encode`."""
+        """Encode all scenes of a split, in half precision: see `CompactBevLlm.encode`."""
         found: list[tuple[torch.Tensor, torch.Tensor]] = []
         with torch.no_grad():
             for start in range(0, len(data.truth), scenes):
@@ -536,7 +536,7 @@ def train_compact(
 
 
 def _rarity(data: QaTensors, of: Facets) -> torch.Tensor:
-    """What to add to the logarithms of the heads' probabilities so that all classes of a facet count alike: of how
+    """Offsets to the logarithms of the heads' probabilities so that all classes of a facet count alike: of how
     often each one comes, the weights in the loss have evened out a part."""
     labels = torch.from_numpy(np.stack([labels_of(truth, of) for truth in data.truth]))
     found: list[torch.Tensor] = []
@@ -558,13 +558,13 @@ def _unwatched(stage: str, step: int, loss: float, seconds: float) -> None:
 
 
 def _same(stored: Mapping[str, Any], recipe: Mapping[str, Any]) -> bool:
-    """Whether a stored recipe differs in the number of steps at most: a run may be made longer."""
+    """True if a stored recipe differs in the number of steps at most: a run may be made longer."""
     apart = ("steps", "gather_steps", "word_steps")
     return {**stored, **dict.fromkeys(apart)} == {**recipe, **dict.fromkeys(apart)}
 
 
 def _kept(recipe: BevLlmRecipe, rng: np.random.Generator) -> Keep:
-    """What a batch is given: of the full network, three in ten go without history, side views or cells."""
+    """Inputs kept for a batch: of the full network, three in ten go without history, side views or cells."""
     if recipe.ablation != "full":
         return recipe.ablation
     spared: tuple[Keep, ...] = ("no-history", "single-view", "no-bev")
@@ -600,7 +600,7 @@ class _Perception:
         return self.truth_loss(rows, tokens, cells)
 
     def truth_loss(self, rows: Any, tokens: torch.Tensor, cells: torch.Tensor | None) -> torch.Tensor:
-        """How far tokens and cells are from the ground truth of their scenes."""
+        """Loss of tokens and cells against the ground truth of their scenes."""
         network, labels = self._answerer.network, self._labels[rows]
         losses = [
             cross_entropy(logits, labels[:, place], self._weights[place], ignore_index=-1)

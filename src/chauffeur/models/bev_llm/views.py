@@ -1,4 +1,4 @@
-"""What the compact network looks at: six cameras, and two cuts of the front one in which far things are larger.
+"""Views of the compact network: six cameras, and two cuts of the front one in which far things are larger.
 
 At a hundred pixels across, a car sixty metres ahead is three pixels wide. The middle of the front picture is kept at
 twice the detail, and the middle of that at four times it, as one more view each with a camera of its own (longer focal

@@ -53,7 +53,7 @@ class Rounded:
     zero: Tensor
 
     def weight(self) -> Tensor:
-        """What a server computes with: (out, in), in the scale's type."""
+        """Dequantised weight that a server computes with: (out, in), in the scale's type."""
         group = self.numbers.shape[1] // self.scale.shape[1]
         wide = (self.numbers - self.zero.repeat_interleave(group, 1)).to(self.scale.dtype)
         return wide * self.scale.repeat_interleave(group, 1)
@@ -92,7 +92,7 @@ class _Group:
 
 @dataclass(frozen=True, slots=True)
 class GroupError:
-    """How far the outputs of one group are off on its calibration inputs, as a share of their own size.
+    """Error of one group's outputs on its calibration inputs, as a share of their own size.
 
     Attributes:
         readers: Names of the matrices.
@@ -268,7 +268,7 @@ def _searched(one: _Group, x: Tensor, group: int) -> tuple[GroupError, Tensor | 
 
 
 def _can_scale(one: _Group) -> bool:
-    """Whether what comes before gives every channel its own; heads that share their values do not."""
+    """True if what comes before gives every channel its own; heads that share their values do not."""
     width = next(iter(one.readers.values())).in_features
     return one.before.get_parameter("weight").shape[0] == width
 

@@ -45,7 +45,7 @@ class Phrases:
 
     @property
     def shares(self) -> list[float]:
-        """How often each is said."""
+        """Share of each in what is said."""
         return [b - a for a, b in pairwise((0.0, *self.sums))]
 
 

@@ -60,7 +60,7 @@ PLACED: Final[Mapping[str, tuple[float, Weights]]] = {
     "u_turn": (0.35, {"at": 5, "here": 2, "after": 1, "next": 2}),
     "exit": (0.3, {"at": 2, "next": 2}),
 }  # fmt: skip
-"""How often an act names a place, and which relation."""
+"""Frequencies with which an act names a place, and which relation."""
 _WAYS: Final[Weights] = {
     "junction": 26, "light": 6, "stop_sign": 4, "roundabout": 3, "end_of_road": 3, "crosswalk": 2, "road": 3, "sign": 1,
     "building": 2, "driveway": 1,
@@ -86,7 +86,7 @@ TARGETS: Final[Mapping[str, Weights]] = {
     "goto": {"building": 6, "landmark": 5, "road": 1, "other": 1},
     "gap": {"car": 6, "truck": 2, "vehicle": 2, "bus": 1, "van": 1},
 }  # fmt: skip
-"""What each verb is about."""
+"""Subject of each verb."""
 _PLACE_KINDS: Final[Mapping[str, Weights]] = {
     "at": _WAYS, "next": {"junction": 8, "road": 3, "light": 3, "roundabout": 1, "driveway": 1, "crosswalk": 1,
         "stop_sign": 1, "building": 1},
@@ -137,7 +137,7 @@ _WAITED: Final[Weights] = {
     "until gone": 8, "until green": 3, "until clear": 4, "until arrives": 3, "until told": 3, "until opens": 1.5,
     "until moves": 1, "until other": 1,
 }  # fmt: skip
-"""What a `wait` waits for."""
+"""Events that a `wait` waits for."""
 _POINTED: Final[Weights] = {
     "stop": 9, "park": 4, "pull_over": 2, "follow": 7, "pass": 2, "avoid": 3, "yield": 4, "turn": 1, "speed": 1,
 }  # fmt: skip

@@ -29,7 +29,7 @@ VOCABULARY: Final = "vocab.txt"
 
 @dataclass(frozen=True)
 class MeaningRecipe:
-    """What decides a training.
+    """Settings that decide a training.
 
     Attributes:
         encoder: Folder of all-MiniLM-L6-v2 (Apache-2.0), or of another BERT of its width.
@@ -210,7 +210,7 @@ def loss_of(network: MeaningParser, batch: Sequence[Tensor], smoothing: float) -
 
 @torch.no_grad()
 def written_for(network: MeaningParser, texts: Sequence[str], pieces: WordPieces, device: str) -> list[list[Written]]:
-    """What the network writes for texts, greedily and without the grammar: for a look while it learns."""
+    """Output of the network for texts, greedily and without the grammar: for a look while it learns."""
     network.eval()
     split = [pieces.split(text) for text in texts]
     ids, mask, *_ = tensors([(list(one.ids), [INDEX[START]], [0]) for one in split])

@@ -28,7 +28,7 @@ _BLOCKS: Final = (
 WIDTH: Final = _BLOCKS[-1][1]
 STRIDE: Final = 16
 _MEAN, _DEVIATION = 127.0 / 255.0, 128.0 / 255.0
-"""What the weights were trained with."""
+"""Normalisation that the weights were trained with."""
 
 
 class EfficientNetLite0(nn.Module):

@@ -58,7 +58,7 @@ WEIGHTS: Final[dict[str, float]] = {
     **dict.fromkeys(("sportily", "economically", "overtake"), 4.0),
     **dict.fromkeys(("a_bit_faster", "a_bit_slower", "much_faster", "much_slower", "let_in", "stop_here"), 2.0),
 }
-"""How often a skill is drawn on a highway, before what does not fit is left out."""
+"""Weight of drawing a skill on a highway, before what does not fit is left out."""
 CROSSING_WEIGHTS: Final[dict[str, float]] = {
     **dict.fromkeys(("turn_left", "turn_right", "go_straight"), 6.0),
     **dict.fromkeys(
@@ -146,7 +146,7 @@ def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[Dialect
 
 
 def _apart(step: DialectStep, other: DialectStep) -> bool:
-    """Whether two steps of a wish are about different things; styles and keeping end a wish by themselves."""
+    """True if two steps of a wish are about different things; styles and keeping end a wish by themselves."""
     kinds = {SKILLS[step.skill].meaning.manoeuvre, SKILLS[other.skill].meaning.manoeuvre}
     return len(kinds) == 2 and not kinds & {"style", "keep", "resume", "turn", "stop", "follow", "yield"}
 

@@ -36,7 +36,7 @@ PER_CASE: Final = 26
 ANSWER_SHARE: Final = 0.2
 """Share of examples that are asked back about or refused wherever we are."""
 MOST_ALIKE: Final = 24
-"""How often a wording may come, numbers and politeness masked, for the same skills."""
+"""Limit on a wording's occurrences, numbers and politeness masked, for the same skills."""
 TEST_EVERY: Final = 25
 """Every so manieth case is kept for validation and tests; half of its wordings are of held-out templates."""
 
@@ -86,7 +86,7 @@ def processes(workers: int) -> ProcessPoolExecutor:
 
 
 def left_out(path: Path) -> Counter[str]:
-    """Why draws became no cases, with counts."""
+    """Reasons for which draws became no cases, with counts."""
     return Counter(str(row["left_out"]) for row in _stored(path).values() if "left_out" in row)
 
 

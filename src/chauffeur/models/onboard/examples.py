@@ -243,7 +243,7 @@ def answer_sections(situation: Situation) -> tuple[str, ...]:
 
 
 def _needs_context(steps: Sequence[DialectStep]) -> bool:
-    """Whether what is meant depends on where we are: "the other lane"."""
+    """True if what is meant depends on where we are: "the other lane"."""
     return any(step.skill == "change_lane" for step in steps)
 
 

@@ -118,7 +118,7 @@ def noisy(text: str, rng: np.random.Generator, level: int) -> str:
 
 
 def protected(word: str) -> bool:
-    """Whether a word keeps its spelling, but for the safe slips; punctuation around it does not matter."""
+    """True if a word keeps its spelling, but for the safe slips; punctuation around it does not matter."""
     core = _core(word).lower().replace("’", "'")
     if any(c.isdigit() for c in core) or "n't" in core:
         return True
@@ -146,7 +146,7 @@ def _open(words: list[str], least: int = 1) -> list[int]:
 
 
 def _kept(words: list[str], i: int) -> bool:
-    """Whether the word stays as it is; the car of "car lengths" is a unit too."""
+    """True if the word stays as it is; the car of "car lengths" is a unit too."""
     return protected(words[i]) or (i + 1 < len(words) and _core(words[i + 1]).lower() in ("length", "lengths"))
 
 

@@ -49,7 +49,7 @@ Told = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class PipelinePlan:
-    """What decides a model.
+    """Settings that decide a model.
 
     Attributes:
         seed: Of everything.
@@ -72,7 +72,7 @@ class PipelinePlan:
 
     @property
     def of_data(self) -> dict[str, Any]:
-        """What decides the data, as `data.json` holds it."""
+        """Settings that decide the data, as `data.json` holds it."""
         base = {} if self.base is None else {"tokenizer": _sha256(_words_of(self.base) / "tokenizer.json")}
         return {"seed": self.seed, "draws": self.draws, "per_case": self.per_case} | base
 
@@ -124,7 +124,7 @@ def _pack(splits: Splits, data: Path, plan: PipelinePlan, told: Told) -> None:
 
 
 def _ships(base: Path) -> bool:
-    """Whether a base is a model as it ships, not the run that made one."""
+    """True if a base is a model as it ships, not the run that made one."""
     return (base / "model.onnx").exists()
 
 

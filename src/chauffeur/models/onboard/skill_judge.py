@@ -1,4 +1,4 @@
-"""Whether a program did what its words say, for every skill: the condition under which it becomes training data.
+"""Checks of a program against its words, for every skill: the condition under which it becomes training data.
 
 Where LaMPilot has a goal for a skill, that goal decides. Elsewhere the last instant is compared with the first: a
 speed, a gap or a lane has moved the right way. Nothing that crashes, leaves the road or fails counts as done.
@@ -21,7 +21,7 @@ from chauffeur.programs import Sandbox
 from chauffeur.worlds.highway import HighwayWorld
 
 HORIZON_S: Final = 20.0
-"""How long a wish without a goal of LaMPilot's is driven."""
+"""Duration of driving a wish without a goal of LaMPilot's."""
 GOAL_S: Final = 70.0
 SPEED_OFF_MPS: Final = 1.2
 SPEED_STEP_MPS: Final = 0.4
@@ -33,7 +33,7 @@ BLOCKED_M: Final = 70.0
 
 @dataclass(frozen=True, slots=True)
 class JudgingVerdict:
-    """Whether a program did what its words say, and why not."""
+    """Verdict on a program against its words, and the reason if it failed."""
 
     done: bool
     why: str = ""

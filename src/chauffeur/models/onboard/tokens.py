@@ -62,7 +62,7 @@ def load_tokenizer(folder: Path) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Blanks:
-    """What it takes to blank words of wishes in training.
+    """Settings for blanking words of wishes in training.
 
     Attributes:
         wish, draft: Tokens that open a wish and end it.

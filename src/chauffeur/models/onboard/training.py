@@ -56,7 +56,7 @@ SIZES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         size: One of SIZES.
@@ -98,7 +98,7 @@ class Recipe:
         return self.steps + self.more
 
     def goes_on_from(self, stored: dict[str, Any], step: int) -> bool:
-        """Whether a run's stored state is one of this recipe, or of its first round when that is finished."""
+        """True if a run's stored state is one of this recipe, or of its first round when that is finished."""
         first = asdict(replace(self, more=0))
         return stored == asdict(self) or (step == self.steps and first | stored == first)
 

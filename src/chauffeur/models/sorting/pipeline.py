@@ -35,7 +35,7 @@ NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks", "town")
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What came of a sorter.
+    """Outcome of a sorter's training.
 
     Attributes:
         learned: Share of the sentences it learned from that it sorts as meant.
@@ -83,7 +83,7 @@ def make_sorters(folder: Path, recipe: SortingRecipe, told: Told, *, measured: b
 
 
 def weather_part(figures: WeatherFigures | None) -> str:
-    """What the card says of the sorter of weather."""
+    """Section of the model card on the sorter of weather."""
     own = sentences("weather")
     digest = hashlib.sha256(table("weather")).hexdigest()[:16]
     words = (

@@ -68,7 +68,7 @@ def sentences(name: Name) -> tuple[Sentence, ...]:
 
 
 def kinds_of(name: Name) -> Sequence[str]:
-    """What a sorter can find, in the order of its numbers."""
+    """Classes of a sorter, in the order of its numbers."""
     if name == "remarks":
         return REMARK_KINDS
     if name == "town":

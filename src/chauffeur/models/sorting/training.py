@@ -34,7 +34,7 @@ def _unheard(share: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class SortingRecipe:
-    """What decides a training.
+    """Settings that decide a training.
 
     Attributes:
         epochs: How often every sentence is looked at.

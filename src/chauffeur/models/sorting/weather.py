@@ -1,4 +1,4 @@
-"""What the sorter of weather learns from, and how well it reads writers it has not learned from.
+"""Training data of the sorter of weather, and how well it reads writers it has not learned from.
 
 Sentences of `weather.tsv` and the grammar `weather.txt`, by themselves and beside wishes, since that is how weather is
 said; and wishes alone, of which the sorter must take none for weather.
@@ -62,7 +62,7 @@ class _Speaker:
 
 
 def weather_sentences(seed: int, without: Collection[str] = ()) -> tuple[Sentence, ...]:
-    """What the sorter learns from.
+    """Training data of the sorter.
 
     Args:
         seed: Of what is drawn.
@@ -86,7 +86,7 @@ def weather_sentences(seed: int, without: Collection[str] = ()) -> tuple[Sentenc
 
 @dataclass(frozen=True, slots=True)
 class WeatherFigures:
-    """How a sorter reads writers and templates that it has not learned from.
+    """Figures of a sorter on writers and templates that it has not learned from.
 
     Attributes:
         said, heard: Sentences of the table that say something of the weather; how many are taken to.

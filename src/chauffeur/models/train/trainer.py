@@ -29,7 +29,7 @@ EVERY_STEPS: Final = 250
 
 @dataclass(frozen=True, slots=True)
 class Optimisation:
-    """How weights are moved: AdamW (Loshchilov and Hutter 2019).
+    """Optimiser settings: AdamW (Loshchilov and Hutter 2019).
 
     Attributes:
         decay: Weight decay of matrices; vectors have none.
@@ -47,7 +47,7 @@ class Optimisation:
 
 
 def bfloat16_pays(device: torch.device) -> bool:
-    """Whether bfloat16 products are the faster here: without hardware for them they are ten times slower."""
+    """True if bfloat16 products are the faster here: without hardware for them they are ten times slower."""
     if device.type != "cpu":
         return True
     one, two = torch.randn(256, 256), torch.randn(256, 256)

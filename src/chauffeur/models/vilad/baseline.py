@@ -65,7 +65,7 @@ class LinearReader:
     inverse_strength: float
 
     def read(self, texts: Sequence[str]) -> list[dict[str, str]]:
-        """What each text asks for, by criterion."""
+        """Wishes of each text, by criterion."""
         table = self.vectors.transform(texts)
         columns = {
             name: [model] * len(texts) if isinstance(model, str) else model.predict(table)
@@ -74,7 +74,7 @@ class LinearReader:
         return [{name: str(column[row]) for name, column in columns.items()} for row in range(len(texts))]
 
     def __call__(self, text: str) -> dict[str, str]:
-        """What a text asks for, by criterion."""
+        """Wishes of a text, by criterion."""
         return self.read([text])[0]
 
 

@@ -131,7 +131,7 @@ def _lot(rng: np.random.Generator) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class DriveStatistics:
-    """What Tab. XIII measures of a drive; x is along the car, y across it.
+    """Measures of a drive from Tab. XIII; x is along the car, y across it.
 
     Attributes:
         speed_variance_x, speed_variance_y: m2/s2.

@@ -35,7 +35,7 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(slots=True)
 class _Kept:
-    """What a layer leaves behind: keys and values (1, heads, N, width), and what it added to the template's vectors."""
+    """A layer's state: keys and values (1, heads, N, width), and what it added to the template's vectors."""
 
     keys: torch.Tensor
     values: torch.Tensor
@@ -181,7 +181,7 @@ class PrefixCached(Uncached):
 
 @dataclass(frozen=True, slots=True)
 class Refresh:
-    """How often dLLM-Cache computes anew.
+    """Refresh intervals of dLLM-Cache.
 
     Attributes:
         prompt: Passes between two refreshes of the prompt.

@@ -110,7 +110,7 @@ class DriveCase:
         return verified_drive(predict, self.street, decided)
 
     def solved(self, asked: Mapping[str, str]) -> bool:
-        """Whether the ideal drive for what somebody understood is what was meant."""
+        """True if the ideal drive for what a reader understood is what was meant."""
         return fulfils(self.street, self.asked, reference(self.street, asked))
 
 

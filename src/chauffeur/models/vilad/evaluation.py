@@ -1,4 +1,4 @@
-"""How well commands are done: success with and without verification, what was understood, consistency, passes, latency;
+"""Metrics of an evaluation: success with and without verification, what was understood, consistency, passes, latency;
 and the linear reader with the exact solver beside it."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Values = Mapping[str, str | int]
 
 
 class Judged(NamedTuple):
-    """What is to be said of an answer.
+    """Verdict on an answer.
 
     Attributes:
         success: It is what was meant.
@@ -49,7 +49,7 @@ class ViladCase(Protocol):
         ...
 
     def judged(self, values: Values) -> Judged:
-        """What is to be said of an answer."""
+        """Verdict on an answer."""
         ...
 
     def verified(self, predict: Predict, decided: Decided) -> Decided:
@@ -57,7 +57,7 @@ class ViladCase(Protocol):
         ...
 
     def solved(self, asked: Mapping[str, str]) -> bool:
-        """Whether the exact answer to what somebody understood is what was meant."""
+        """True if the exact answer to what a reader understood is what was meant."""
         ...
 
 

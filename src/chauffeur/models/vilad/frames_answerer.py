@@ -60,7 +60,7 @@ class FramesAnswerer:
 
     @property
     def model(self) -> str:
-        """What it is."""
+        """Name of the model."""
         return f"{self._model.about['version']}, {self._method}"
 
     async def write(self, messages: Sequence[Message]) -> Prose:

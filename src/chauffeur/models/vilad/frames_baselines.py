@@ -61,7 +61,7 @@ def told(model: StatusHead, frames: FrameSet) -> Array:
 
 
 def expected_paths(model: StatusHead, frames: FrameSet) -> Array:
-    """Where own motion and command alone lead, (n, FUTURE, 2), m, ego frame: what a picture is to correct."""
+    """Path from own motion and command alone, (n, FUTURE, 2), m, ego frame: what a picture is to correct."""
     return np.stack([constant_velocity(one) for one in frames.histories]) + told(model, frames)
 
 

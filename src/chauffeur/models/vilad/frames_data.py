@@ -46,7 +46,7 @@ class FrameSet:
 
     @property
     def commands(self) -> list[str]:
-        """What the navigation says."""
+        """Commands of the navigation, one a sample."""
         return [one.command for one in self.samples]
 
     def part(self, kept: NDArray[np.bool_]) -> FrameSet:
@@ -61,7 +61,7 @@ class FrameSet:
 
 
 def ego_features(history: Array) -> Array:
-    """What a car's own motion tells, each number about 1: (EGO_WIDTH,), float32.
+    """Features of a car's own motion, each number about 1: (EGO_WIDTH,), float32.
 
     Args:
         history: (5, 3): poses, speeds over each half second, their changes, and how far a constant turn rate and

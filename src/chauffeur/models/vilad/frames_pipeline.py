@@ -41,7 +41,7 @@ VIEWS: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class FramesPlan:
-    """What decides the whole.
+    """Settings that decide the whole pipeline.
 
     Attributes:
         vision: Of the encoder.

@@ -39,7 +39,7 @@ after others is narrowed to one of the futures that could come: one pass is both
 
 @dataclass(frozen=True, slots=True)
 class FramesRecipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         mode: Masked diffusion, or the autoregressive twin of the same size and data.

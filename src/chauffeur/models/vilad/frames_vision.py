@@ -37,7 +37,7 @@ _WEIGHT: Final = 4.0
 
 @dataclass(frozen=True, slots=True)
 class VisionRecipe:
-    """What decides the encoder's training.
+    """Settings that decide the encoder's training.
 
     Attributes:
         vision: The encoder.
@@ -57,7 +57,7 @@ class VisionRecipe:
 
 
 def status(frames: FrameSet) -> Array:
-    """What is known without a picture, (n, STATUS_WIDTH): own motion, and which of the commands it is."""
+    """Inputs known without a picture, (n, STATUS_WIDTH): own motion, and which of the commands it is."""
     said = np.zeros((len(frames.samples), len(SAID)), np.float32)
     for line, command in enumerate(frames.commands):
         if command in SAID:

@@ -14,7 +14,7 @@ from chauffeur.planners.vilad.unmasking import NEVER
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """How tokens are masked in training.
+    """Masking of tokens in training.
 
     Attributes:
         least: Smallest noise level t; the paper's U(0, 1) with 0.001 against a division by nothing.

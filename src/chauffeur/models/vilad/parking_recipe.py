@@ -79,7 +79,7 @@ class ParkingCase:
         return verified(predict, self.spots, decided)
 
     def solved(self, asked: Mapping[str, str]) -> bool:
-        """Whether the best spot for what somebody understood is among the best for what was meant."""
+        """True if the best spot for what a reader understood is among the best for what was meant."""
         return bool(best(self.spots, self.asked)[1][best(self.spots, asked)[0]])
 
 

@@ -32,7 +32,7 @@ _VOCABULARIES: Final[tuple[tuple[Split, Split], ...]] = (
     ("phrasing", "vocabulary"),
     ("vocabulary", "vocabulary"),
 )
-"""Where the words around a place and its name come from."""
+"""Sources of the words around a place and its name."""
 
 _JOINS: Final = (", ", " and ", ", and ", " but also ", ", ideally ", " ")
 BANK: Final = PhraseBank("parking.txt", _JOINS)

@@ -30,7 +30,7 @@ _WRITERS: Final[Mapping[Split, frozenset[str]]] = {
     "fit": frozenset("abcd"),
     "tune": frozenset("ef"),
 }
-"""Whose phrases a split may use; the others have those of writers that are held out."""
+"""Writers whose phrases a split may use; the others have those of writers that are held out."""
 _HELD_BACK_OF: Final = 5
 """One combination of so many is kept from training."""
 _WORD: Final = re.compile(r"[a-z']+")
@@ -97,7 +97,7 @@ class PhraseBank:
 
 
 def held_back(asked: Mapping[str, str], nothing: Mapping[str, str]) -> bool:
-    """Whether a combination of things asked for is kept from training.
+    """True if a combination of things asked for is kept from training.
 
     Args:
         asked: A value for each criterion.

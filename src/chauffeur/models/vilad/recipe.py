@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false, reportUnknownParameterType=false
-"""What ViLaD recipes share: commands and fresh scenes without end, the fixed pattern, the objective, the run.
+"""Shared parts of ViLaD recipes: commands and fresh scenes without end, the fixed pattern, the objective, the run.
 
 A recipe of a task is a `ViladTask` (what is said, in what scene, and what the right answer is) over this.
 """
@@ -28,7 +28,7 @@ Mode = Literal["fixed", "plain", "twin"]
 
 @dataclass(frozen=True, slots=True)
 class ViladRecipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         size: One of `network.SIZES`.
@@ -76,7 +76,7 @@ class HasText(Protocol):
 
 
 class ViladTask(Protocol):
-    """What a recipe learns."""
+    """Task that a recipe learns."""
 
     @property
     def template(self) -> ActionTemplate:
@@ -263,7 +263,7 @@ _READING: Final = ("words.", "body.")
 
 
 def continues(recipe: ViladRecipe) -> Callable[[dict[str, Any], int], bool]:
-    """Whether a stored run may go on as this recipe: the same, or with other steps as long as no rate differs yet."""
+    """Check if a stored run may go on as this recipe: the same, or with other steps as long as no rate differs yet."""
 
     def fine(stored: dict[str, Any], step: int) -> bool:
         if stored | {"steps": recipe.steps} != asdict(recipe):

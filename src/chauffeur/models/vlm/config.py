@@ -10,7 +10,7 @@ from chauffeur.models.train.rates import cosine_rate
 
 @dataclass(frozen=True, slots=True)
 class VlmRecipe:
-    """What decides a training run.
+    """Settings that decide a training run.
 
     Attributes:
         size: One of `network.SIZES`.
@@ -45,6 +45,6 @@ class VlmRecipe:
         return cosine_rate(step, self.steps, self.rate, self.warmup, 0.03)
 
     def seeing(self) -> dict[str, Any]:
-        """What decides the eye's training."""
+        """Settings that decide the eye's training."""
         names = ("size", "scenes", "seeing_steps", "seen_pictures", "seeing_rate", "seed")
         return {name: getattr(self, name) for name in names}

@@ -102,7 +102,7 @@ def fitted_head(features: Array, wanted: Array, seed: int) -> StyleHead:
 
 
 def style_worth() -> list[list[float]]:
-    """How well the gains taught for a style (row) fit the ranges of the one that was meant (column), Eq. 27 / 100.
+    """Fit of the gains taught for a style (row) fit the ranges of the one that was meant (column), Eq. 27 / 100.
 
     In doubt between haste and care, moderate gains are off by less than either: a reader that is not sure takes the
     style whose expected worth is highest.

@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false, reportUnknownParameterType=false
-"""How well a VLM sees, listens and writes gains: on places, writers and looks that training did not have."""
+"""Evaluation of a VLM's seeing, listening and gains: on places, writers and looks that training did not have."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from chauffeur.safety.gain_box import LOGARITHMIC
 
 @dataclass(frozen=True, slots=True)
 class GainCase:
-    """What the gains depend on; words as in `planners.vlm.template`."""
+    """Conditions that the gains depend on; words as in `planners.vlm.template`."""
 
     style: str
     weather: str
@@ -43,7 +43,7 @@ def gain_table() -> dict[str, Any]:
 
 
 def care_share(case: GainCase) -> float:
-    """Where between a style's boldest (0) and most careful (1) gains a case lies."""
+    """Position of a case between a style's boldest (0) and most careful (1) gains."""
     table = gain_table()
     lead = {"no_lead": "none", "far_lead": "far", "lead": "ahead", "near_lead": "near"}[case.lead]
     share = table["weather"][case.weather] + table["lead"][lead] + table["task"][case.task]

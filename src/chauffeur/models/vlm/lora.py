@@ -37,7 +37,7 @@ _IGNORED: Final = -100
 
 @dataclass(frozen=True, slots=True)
 class LoraRecipe:
-    """What decides a fine-tuning. The defaults are the paper's (Sec. VI-B5b) where it prints them.
+    """Settings that decide a fine-tuning. The defaults are the paper's (Sec. VI-B5b) where it prints them.
 
     Attributes:
         epochs: How often each pair is seen (paper: 5).

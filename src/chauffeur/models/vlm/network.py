@@ -111,7 +111,7 @@ class CompactVlm(nn.Module):
         return self.glance(self.eye(pixels))
 
     def perceived(self, pixels: torch.Tensor) -> tuple[list[torch.Tensor], torch.Tensor]:
-        """What the eye is taught before any words: logits of each of `SIGHTS`, (B, words) each, and of how much of each
+        """Targets of the eye before any words: logits of each of `SIGHTS`, (B, words) each, and of how much of each
         cell vehicles, and the lead vehicle, cover, (B, 2, *CELLS)."""
         features = self.eye(pixels)
         tokens = self.glance(features)

@@ -113,7 +113,7 @@ _WEIGHTS: Final = torch.tensor(
     [0.0 if isinstance(piece, str) or piece.name in GIVEN else 2.0 if piece.name == "style" else 1.0
      for piece in TEMPLATE.pieces]
 )  # fmt: skip
-"""What each token's error counts; fixed and given ones count nothing."""
+"""Weight of each token's error; fixed and given ones count nothing."""
 
 
 def loss_of(model: CompactVlm, batch: VlmBatch) -> torch.Tensor:

@@ -55,7 +55,7 @@ Pictures = np.ndarray[Any, np.dtype[np.uint8]]
 
 @dataclass(frozen=True, slots=True)
 class SceneFacts:
-    """What is true of a picture, in the words of `planners.vlm.template`, and where it was taken."""
+    """Facts of a picture, in the words of `planners.vlm.template`, and where it was taken."""
 
     weather: str
     grade: str
@@ -253,7 +253,7 @@ class PictureSet:
     facts: tuple[SceneFacts, ...]
 
     def __len__(self) -> int:
-        """How many."""
+        """Number of them."""
         return len(self.facts)
 
 

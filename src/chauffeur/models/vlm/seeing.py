@@ -73,7 +73,7 @@ def _colour_matrix(hue_rad: float, saturation: float) -> Array:
 
 
 def mirrored(facts: SceneFacts) -> SceneFacts:
-    """What is true of a picture seen in a mirror."""
+    """Facts of a mirrored picture."""
     return replace(facts, road=_MIRRORED[facts.road])
 
 
@@ -171,7 +171,7 @@ def train_eye(
 def sights(
     model: CompactVlm, pictures: PictureSet, seed: int
 ) -> tuple[torch.Tensor, tuple[tuple[SceneFacts, ...], ...]]:
-    """What the frozen eye makes of every picture, varied: (_VARIANTS, N, SEEN, hidden); and the facts of each."""
+    """Features from the frozen eye for every picture, varied: (_VARIANTS, N, SEEN, hidden); and the facts of each."""
     model.eval()
     found: list[torch.Tensor] = []
     for variant in range(_VARIANTS):

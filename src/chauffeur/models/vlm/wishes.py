@@ -1,4 +1,4 @@
-"""What is said beside the pictures: sentences of many writers, each with the style of driving it asks for.
+"""Words beside the pictures: sentences of many writers, each with the style of driving it asks for.
 
 Sources: the sorters' table (`data/sorters`, 31 writers; hints, reasons and remarks), the on-board model's grammar of
 moods (`data/onboard`), and manners of the three manoeuvres (`data/vlm/manners.txt`). Whole writers, and the templates

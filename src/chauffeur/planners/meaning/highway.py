@@ -32,7 +32,7 @@ _UNITS: Final[Mapping[str, tuple[Kind, str, float]]] = {
 _LEADS: Final[frozenset[ReferenceKind]] = frozenset(
     {"car", "truck", "bus", "van", "motorcycle", "bicycle", "vehicle", "vehicles", "traffic", "other"}
 )
-"""What a lead vehicle may be called."""
+"""Names of a lead vehicle."""
 _PLACES: Final[frozenset[ReferenceKind]] = frozenset(
     {"building", "landmark", "lot", "gate", "driveway", "parking_space", "roundabout", "sidewalk", "end_of_road"}
 )

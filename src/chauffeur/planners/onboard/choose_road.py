@@ -13,7 +13,7 @@ from chauffeur.planners.onboard.options import USUAL_HEADWAY_S, Chosen, Declined
 _STEPS: dict[str, Literal[-1, 1]] = {"left": -1, "right": 1}
 _PASS_BY_MPS = {"swift": 12.0}
 _PLAIN_PASS_BY_MPS = 10.0
-"""How much faster than the vehicle ahead an overtaking is planned."""
+"""Speed over the vehicle ahead at which an overtaking is planned."""
 _CLEAR_M = 15.0
 """Centre-to-centre lead over the overtaken vehicle at which the overtaking is done: two car lengths between bumpers."""
 _WORDS = {"left": "turn left", "right": "turn right", "straight": "go straight on"}

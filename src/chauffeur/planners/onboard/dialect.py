@@ -162,7 +162,7 @@ CONDITIONS: Final[Mapping[str, tuple[Kind | None, str]]] = {
     "clear_left": (None, "the left lane is clear"),
     "clear_right": (None, "the right lane is clear"),
 }
-"""What a step may wait for or depend on: what the number measures, and the words."""
+"""Conditions a step may wait for or depend on: what the number measures, and the words."""
 
 
 @dataclass(frozen=True, slots=True)

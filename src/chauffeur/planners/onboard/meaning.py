@@ -19,7 +19,7 @@ Manoeuvre = Literal[
 Side = Literal["left", "right", "straight"]
 Change = Literal[-1, 0, 1]
 Frame = Literal["absolute", "relative", "factor", "over_limit"]
-"""How an amount counts: as the new value, as a difference, as a multiple, or as a difference to the speed limit."""
+"""Meaning of an amount: as the new value, as a difference, as a multiple, or as a difference to the speed limit."""
 
 Bound = Literal["exact", "at_most", "at_least"]
 

@@ -14,7 +14,7 @@ from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.programs.catalogue import vocabulary_of
 
 USUAL_HEADWAY_S = 1.5
-"""Time headway the car keeps when nobody asked for another."""
+"""Time headway the car keeps when no one asked for another."""
 
 API_MAX_HEADWAY_S = 2.0
 """Largest time headway the driving APIs keep."""

@@ -19,7 +19,7 @@ END, BLANK = "<|end|>", "<|blank|>"
 SPECIAL: Final = (END, CONTEXT, HISTORY, WISH, DRAFT, REPLY, BLANK)
 
 ASK, REFUSE = "ASK: ", "REFUSE: "
-"""How a reply begins that drives nothing: a question back, or a reason."""
+"""Opening of a reply that drives nothing: a question back, or a reason."""
 
 FENCE_OPEN, FENCE_CLOSE = "```python\n", "```\n"
 

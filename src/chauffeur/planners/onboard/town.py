@@ -43,7 +43,7 @@ _SIGN: Final = re.compile(
     r"(?:stop sign|stop|traffic light|lights?|signal)\b",
     re.IGNORECASE,
 )
-"""Where to turn, not what to do about the sign."""
+"""Directions to turn, not what to do about the sign."""
 _TIME: Final = re.compile(r"\b(?:quarter|half|past|o'clock|noon|midnight|minutes?|hours?|time|least|once|all)\b")
 """What stands behind "at" or "for" and is no place."""
 _CORRECTS: Final = re.compile(

@@ -34,7 +34,7 @@ PLAIN_WISHES: Final = {
     "closer": "Drive closer to the car ahead.",
     "further": "Keep more distance to the car ahead.",
 }
-"""What a hint of each kind becomes: an ordinary wish, never more."""
+"""Wish that a hint of each kind becomes: an ordinary wish, never more."""
 
 
 @dataclass(frozen=True, slots=True)

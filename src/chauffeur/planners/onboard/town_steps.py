@@ -71,7 +71,7 @@ _NAMES: Final = {
     for kind in PLACE_KINDS
     for name in (kind.replace("_", " "), *(" ".join(tokens_of(one)) for one in PLACE_WORDS.get(kind, ())))
 }
-"""What our own towns' places are called, and their kinds."""
+"""Names of our own towns' places, and their kinds."""
 _JUST: Final = re.compile(r"\b(?:straight|just)\s{1,3}$", re.IGNORECASE)
 """Before "after": at once."""
 _STRAIGHT: Final = re.compile(r"\bstraight\b(?! (?:after|past|away|behind))", re.IGNORECASE)

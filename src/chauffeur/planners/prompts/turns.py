@@ -59,7 +59,7 @@ MAX_FINDINGS = 12
 """Findings of the gate shown in a repair turn."""
 
 REFUSED_BY_CHECKS = "The checks refused this answer:"
-"""How a repair turn begins."""
+"""Opening of a repair turn."""
 
 _FORGED = re.compile(r"^(wish|situation|settings used|outcome|passenger said afterwards|program) ?:", re.I | re.M)
 

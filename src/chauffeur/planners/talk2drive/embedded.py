@@ -62,7 +62,7 @@ _ELSEWHERE: Final[dict[str, str]] = {
 """What cannot be said in parameters, by the first part of its intent."""
 _WHERE_TO: Final = "I am not sure what you want. Shall I turn at the junction, and to which side?"
 _OFF_TOPIC: Final = "I only drive"
-"""How the model declines what is no wish about driving."""
+"""Words with which the model declines what is no wish about driving."""
 _GIVES_WAY_SHARE: Final = 0.8
 """Of the present speed, as for a careful drive."""
 _SURE: Final = 0.35

@@ -26,7 +26,7 @@ _THINGS: Final = _any(
     r"gas|signs?|hat|parcel|buck)",
     r"(?:me|us|through|away|out|up|over|judgement|unnoticed)",
 )
-"""What is passed in another sense."""
+"""Things passed in another sense."""
 _THEM: Final = r"(?:him|her|it|them|this|that|these|those|the|an?|each|all|any\w*|every\w*|some\w*|grand\w+|mr|mister)"
 _PAST: Final = r"(?:past|by|around|round|ahead of|in front of)"
 _PLACES: Final = r"(?:the|that|this|a) (?:corner|bend|block|roundabout|curve|town|back)"

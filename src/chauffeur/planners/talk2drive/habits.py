@@ -64,7 +64,7 @@ _DID: Final[tuple[tuple[str, str], ...]] = (
     ("yield", "yield"),
     ("turn.straight", "go"),
 )
-"""What was done, by the beginning of its intent."""
+"""Deeds by the beginning of their intent."""
 _SURE: Final = 0.4
 """From this share a remark is taken for what it was sorted as."""
 

@@ -25,7 +25,7 @@ HINT_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "intersection": ("go", "yield", "hurry", "calm", "none", "else"),
     "parking": ("park.nearest", "park.stadium", "park.exit", "faster", "slower", "none", "else"),
 }
-"""What can be meant, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
+"""Possible meanings, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
 read word by word."""
 
 _ENDS: Final = (*".!?", "")
@@ -43,7 +43,7 @@ _SIDES: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 calm, however the likelihood of the first is split."""
 
 _WANTS_NOTHING: Final = 2.0
-"""How much more `none` counts against whole sides: it has nothing that speaks for it, and who chats is to be left in
+"""Extra weight of `none` against whole sides: it has nothing that speaks for it, and who chats is to be left in
 peace."""
 
 _ALIKE: Final = {
@@ -55,7 +55,7 @@ _ALIKE: Final = {
 _MOODS: Final = ("hurry", "calm")
 _ALIKE_SHARE: Final = 0.4
 _FADES: Final = 0.85
-"""What a trip weighs against the one after it."""
+"""Weight of a trip against the one after it."""
 _SAME_WORDS: Final = 0.6
 """From this similarity a wish counts as the same said again, and what it was told to mean holds."""
 _SAME_WEIGHT: Final = 5.0

@@ -22,9 +22,9 @@ _ROAD_STEP: Final = 0.12
 _CALM_ENOUGH: Final = 0.85
 """Share of the limit above which a car that is found too fast goes down to a calm speed."""
 _NEAR_S: Final = 4.0
-"""A car farther ahead than this holds nobody up yet."""
+"""Distance beyond which a car ahead holds no one up yet."""
 _SLOWER_SHARE: Final = 0.92
-"""Of the limit: a car that is faster than this holds nobody up."""
+"""Share of the limit above which a car holds no one up."""
 _LEAST_BY_MPS: Final = 1.0
 _PASSES_BY_MPS: Final = 5.0
 """By how much a car is passed that holds somebody up: a long way side by side helps nobody."""

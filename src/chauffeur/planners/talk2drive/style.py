@@ -49,7 +49,7 @@ PARKING_MPS: Final = 3.0
 
 DISTANCE_M: Final = (3.0, 60.0)
 RATIO_S: Final = (0.5, 4.0)
-"""What a model may choose between."""
+"""Choices of a model."""
 
 _PARKS: Final = re.compile(r"\b(?:park|parking|spots?|spaces?|places?|bays?|stalls?)\b", re.IGNORECASE)
 _SPOT: Final = re.compile(

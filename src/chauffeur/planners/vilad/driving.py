@@ -69,7 +69,7 @@ CRUISE_MPS: Final[Mapping[str, float]] = {"slow": 3.0, NONE: 5.0, "brisk": 7.0}
 EASY_MPS2: Final = 1.0
 """Speeding up and slowing down."""
 FIRM_MPS2: Final = 2.0
-"""Where a stop would take more than this, there is no room for it."""
+"""Braking beyond which there is no room for a stop."""
 BEND_MPS2: Final = 0.7
 """Sideways in bends; the paper's drives reach 0.68 m/s2."""
 SHIFT_M: Final = 12.0
@@ -81,7 +81,7 @@ _CLEAR_M: Final = 1.5
 _BEYOND_M: Final = 1.75
 _ON_M: Final = 0.5
 _FREE_M: Final = 16.0
-"""Where to stop when nothing says where: soon."""
+"""Default distance of a stop: soon."""
 _LATER_M: Final = 8.0
 """A distance that was named is not exceeded by more than this to find room."""
 _GRID_M: Final = 0.25

@@ -52,7 +52,7 @@ TEMPLATE: Final = ActionTemplate(
 """13 decisions among 28 tokens. Candidate 0 of `spot` says that no free spot is what is asked for."""
 CRITERIA: Final = tuple(slot.name for slot in TEMPLATE.slots if slot.name not in ("row", "spot"))
 NOTHING: Final[Mapping[str, str]] = {name: "plain" if name == "bay" else NONE for name in CRITERIA}
-"""What is asked for when nothing is."""
+"""Default when nothing is asked for."""
 
 WIDTH: Final = len(LANDMARKS) + 2 + len(BAYS) + 2 + 1 + len(ROWS)
 """Numbers by which a candidate is described."""

@@ -27,7 +27,7 @@ SHIPPED: Final = Path(__file__).parent / "weights"
 TRUST: Final = 90.0
 """Percent right on unseen scenes from which on a fact is told to people."""
 BLIND: Final = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-"""What is fed where there is no picture."""
+"""Input where there is no picture."""
 
 
 @dataclass(frozen=True, slots=True)

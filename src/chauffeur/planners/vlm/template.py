@@ -22,7 +22,7 @@ Style = Literal["conservative", "moderate", "aggressive"]
 STYLES: Final[tuple[Style, ...]] = "conservative", "moderate", "aggressive"
 TASKS: Final = ("acceleration", "lane_change", "left_turn")
 RECALLS: Final = ("none", "gentler", "brisker")
-"""What earlier feedback on such a wish asks for."""
+"""Demands of earlier feedback on such a wish."""
 SEEN_WEATHERS: Final = ("sunny", "night", "rain", "fog", "snow")
 """In the order in which they ask for care."""
 GRADES: Final = ("clear", "light", "heavy")
@@ -31,7 +31,7 @@ ROADS: Final = ("straight", "bend_left", "bend_right")
 SIGHTS: Final[Mapping[str, tuple[str, ...]]] = {
     "weather": SEEN_WEATHERS, "grade": GRADES, "lead": LEADS, "road": ROADS,
 }  # fmt: skip
-"""What is seen, by slot."""
+"""Words for what is seen, by slot."""
 GAINS: Final = tuple(name.lower() for name in GAIN_NAMES)
 LEVELS: Final = 24
 """Values of a gain in the codebook."""

@@ -53,7 +53,7 @@ SAID: Final[Mapping[SaidWeather, str]] = {
     "snow": "there is snow",
     "slippery": "it is slippery",
 }
-"""What a passenger said of the weather or the road, as it is said back."""
+"""Wording for repeating a passenger's remark on the weather or the road."""
 AS_SEEN: Final[Mapping[SaidWeather, str]] = {
     "night": "night",
     "rain": "rain",
@@ -64,7 +64,7 @@ AS_SEEN: Final[Mapping[SaidWeather, str]] = {
 """The picture that would ask for as much care."""
 
 FACTS: Final = frozenset({"grade", "lead", "road"})
-"""What there is to say of a scene beside the weather."""
+"""Remarks on a scene beside the weather."""
 
 
 def scene_words(values: Mapping[str, str], told: Collection[str] = FACTS) -> str:

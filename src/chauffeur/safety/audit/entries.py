@@ -79,7 +79,7 @@ class NotARecordError(ValueError):
 
 
 def canonical(value: Any) -> bytes:
-    """The one written form of a JSON value. Raises TypeError or ValueError for what is none."""
+    """Canonical JSON of a value. Raises TypeError or ValueError for a value that JSON cannot hold."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
 LineCode = Literal["not_json", "not_fields", "not_canonical", "not_typed"]
-"""Why a line is no record."""
+"""Reasons for which a line is no record."""
 
 TextCode = Literal["text_added", "text_removed", "text_changed"]
 """Tampering with a personal text."""

@@ -183,7 +183,7 @@ class Shield:
         return abs(after) > abs(before) and (steep or abs(speed * math.sin(after)) > self._table.sideways_mps)
 
     def _why_not(self, scene: ShieldScene, own: Strip, span: Span) -> str:
-        """Why the body must not sweep a span; empty when it may."""
+        """Reason the body must not sweep a span; empty when it may."""
         ego = scene.ego
         low, high = ego.d_m - ego.half_width_m, ego.d_m + ego.half_width_m
         # Where lanes bend and cross there is road beside them, and cars cut corners.
@@ -208,7 +208,7 @@ class Shield:
         return ""
 
     def _too_close(self, ego: ShieldBody, other: ShieldBody, touched: bool) -> str:
-        """Why the ego must not come, or come further, into the lane of another; empty when it may.
+        """Reason the ego must not come, or come further, into the lane of another; empty when it may.
 
         A car behind has seen it (`touched`) once it is over the line, and needs no time to respond any more.
         """

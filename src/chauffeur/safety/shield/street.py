@@ -126,7 +126,7 @@ class _Instant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fault:
-    """Why a command leaves no manoeuvre: whom the car would meet, or None where it would leave its ground."""
+    """Reason a command leaves no manoeuvre: the vehicle the car would meet, or None where it would leave its ground."""
 
     other: VehicleState | None = None
 

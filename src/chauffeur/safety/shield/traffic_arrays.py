@@ -135,7 +135,7 @@ def overlapping(
     where: int,
     reach_m: float,
 ) -> Array:
-    """Rows of those who are, or are on their way, within a span of the road; the ego is none of them.
+    """Rows of the agents in, or entering, a lateral interval of the road; never the ego's.
 
     Args:
         rows: As `placed` gives them.

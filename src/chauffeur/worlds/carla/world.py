@@ -42,7 +42,7 @@ _LIFT_M: Final = 0.5
 _LAG_S: Final = 0.2
 """Time until pedals and wheel have answered."""
 _STRAY_S: Final = 0.02
-"""What a stop may end beside where a bicycle puts it, m for every m/s: at 15 m/s as much as lanes leave this car."""
+"""Offset of a stop from where a bicycle model puts it, m for every m/s: at 15 m/s as much as lanes leave this car."""
 _TOUCH_S: Final = 0.2
 """A contact is told for so long after the server's last word of it."""
 _STATES: Final[dict[str, SignalState]] = {"Red": "red", "Yellow": "yellow", "Green": "green"}

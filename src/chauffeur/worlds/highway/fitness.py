@@ -17,13 +17,13 @@ _RESPONSE_S: Final = 0.5
 _BRAKING_MPS2: Final = 4.0
 """What the rear one brakes with, half a second on; the front one goes on as it does. IDM's comfortable braking."""
 _ALONG: Final = math.cos(math.radians(40.0))
-"""Who is turned by less against another drives along with it (`safety.shield.frame.CROSSING_RAD`)."""
+"""Cosine of the angle to another vehicle below which one drives along with it (`safety.shield.frame.CROSSING_RAD`)."""
 _FAR_M: Final = 150.0
 """Way that no speed of these roads needs to be braked away in."""
 
 
 def fit_to_begin(everybody: Sequence[VehicleState]) -> bool:
-    """True if nobody has crashed, nobody overlaps, and whoever comes up behind another can still brake for it.
+    """True if no vehicle has crashed or overlaps another, and each that comes up behind another can still brake for it.
 
     Args:
         everybody: The ego and all that is solid around it; stop signs are not.

@@ -46,7 +46,7 @@ class RoadPerception(Perception, Protocol):
 
     @property
     def emergency_lanes(self) -> frozenset[LaneId]:
-        """Lanes nobody but a car in distress may use."""
+        """Lanes for cars in distress only."""
         ...
 
     def instant(self) -> Instant:

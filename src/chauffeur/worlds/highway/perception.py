@@ -33,7 +33,7 @@ class HighwayPerception:
 
     @property
     def emergency_lanes(self) -> frozenset[LaneId]:
-        """Lanes nobody but a car in distress may use."""
+        """Lanes for cars in distress only."""
         return self._emergency_lanes
 
     def instant(self) -> Instant:

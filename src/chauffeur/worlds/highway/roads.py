@@ -38,7 +38,7 @@ HIGHWAY_LIMIT_MPS = 31.2928  # 70 mph
 RAMP_LIMIT_MPS = 24.5872  # 55 mph
 _CLEAR_M = 20.0
 _JOINT_M = 0.5
-"""Where a lane ends, those that begin within this distance go on from it."""
+"""Distance from a lane's end within which other lanes' starts continue it."""
 _CAR_M = (5.0, 2.0)
 _OBSTACLE_M = (2.0, 2.0)
 _EXPONENTS = (3.5, 4.5)
@@ -118,7 +118,7 @@ class HighwayScene:
         ego: The ego.
         traffic: All other vehicles, in the order in which they were placed.
         objects: Obstacles and signs.
-        emergency_lanes: Lanes nobody but a car in distress may use.
+        emergency_lanes: Lanes for cars in distress only.
         actuation: Full-scale pedal and wheel values.
         alone_steps: Steps of the traffic before the ego enters; 0 where it is there from the start.
         warm_up_steps: Steps with neutral controls before the trip begins.

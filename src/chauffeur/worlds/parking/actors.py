@@ -18,9 +18,9 @@ WALKER_M: Final = 0.6
 _LOOK: Final = Look(3.0, 1.0)
 _WALKS_MPS: Final = 1.2
 _SHY_M: Final = 0.7
-"""How close to a car that moves nobody walks."""
+"""Distance that pedestrians keep from a moving car."""
 _PASSING_M: Final = 0.2
-"""How close to one that stands."""
+"""The same from a standing one."""
 _TOUCH_M: Final = 0.02
 _STANDS_MPS: Final = 0.1
 _PREVIEW_S: Final = 0.5
@@ -29,7 +29,7 @@ _PATIENCE_S: Final = 3.0
 
 
 class CarMoved(NamedTuple):
-    """What changes of a car that leaves: way driven, speed, whether it has crashed, where its follower has it."""
+    """Mutable state of a car that leaves: way driven, speed, whether it has crashed, where its follower has it."""
 
     station_m: float
     speed_mps: float

@@ -17,11 +17,11 @@ from chauffeur.worlds.parking.lot import AISLE_M, CORNER_M, Lot, Points, Spot, n
 TURN_M: Final = 5.4
 """Radius onto a spot."""
 ASIDE_M: Final = 1.1
-"""How far from the aisle's middle, away from the spot, its far side is driven."""
+"""Offset from the aisle's middle, away from the spot, at which its far side is driven."""
 SPOT_ROOM_M: Final = 0.15
 """How far beside the way onto a spot the rear axle may be: a third of what is left at the neighbours."""
 _SHORT_M: Final = 0.5
-"""How far before the end of the lanes the front bumper stops."""
+"""Distance before the end of the lanes at which the front bumper stops."""
 _STEP_M: Final = 0.25
 _SHIFT_M: Final = 8.0
 """Way over which a car that is in the aisle already gets to its far side."""

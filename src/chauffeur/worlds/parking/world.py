@@ -206,7 +206,7 @@ class ParkingWorld(WorldBase[ParkingPerception, ParkingDriver]):
         return pack(self._tick, self._ego, self._cars, self._walkers, self._hit)
 
     def adopt(self, observation: bytes) -> None:
-        """Be at an instant of the same scenario and seed, stepped elsewhere. Raises DataError if it is none."""
+        """Take over an instant of the same scenario and seed that was stepped elsewhere. Raises DataError if none."""
         scene = self._started()
         instant = unpack(observation, scene.cars, scene.walkers, (car.id for car in scene.parked))
         self._tick, self._ego = instant.tick, _Ego.at(instant.ego)

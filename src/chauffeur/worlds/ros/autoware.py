@@ -1,4 +1,4 @@
-"""What is said to Autoware (ROS 2), and why so: message definitions, topics, and every field's value.
+"""Messages to Autoware (ROS 2), and why so: message definitions, topics, and every field's value.
 
 Sources: definitions read in `autowarefoundation/autoware_internal_msgs` and `autoware_adapi_msgs`; the rules of
 `external_velocity_limit_selector` in Autoware's own documentation of it.
@@ -36,7 +36,7 @@ SENDER: Final = "chauffeur"
 """Our name among those who limit the velocity."""
 
 Package = Literal["autoware_internal_planning_msgs", "tier4_planning_msgs"]
-"""Where the velocity limit is defined: the former since Autoware 2025, the latter before."""
+"""Packages that define the velocity limit: the former since Autoware 2025, the latter before."""
 
 _CONSTRAINTS: Final[dict[Package, dict[str, float]]] = {
     "autoware_internal_planning_msgs": {

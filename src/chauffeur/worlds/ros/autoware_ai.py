@@ -1,4 +1,4 @@
-"""What is said to Autoware.AI (ROS 1, behind a rosbridge server), and why so: topics, and every field's value.
+"""Messages to Autoware.AI (ROS 1, behind a rosbridge server), and why so: topics, and every field's value.
 
 Sources, read in `autowarefoundation/autoware_ai_planning`: `pure_pursuit/src/pure_pursuit_core.cpp` and
 `waypoint_maker/nodes/waypoint_replanner/`; message definitions as generated from `autoware_config_msgs`.

@@ -79,7 +79,7 @@ def _as_meant(speed_mps: float) -> float:
 
 
 _ROUNDED_MPS: Final = 0.01
-"""What rounding up to hundredths adds at most."""
+"""Most that rounding up to hundredths adds."""
 
 
 def _within(what: str, value: object, bounds: tuple[float, float], unit: str) -> float:

@@ -22,7 +22,7 @@ from chauffeur.worlds.ros.dds import Participant, stamp_of
 from chauffeur.worlds.ros.threaded import ThreadedVehicle
 
 PERIOD_S: Final = 0.05
-"""How often the graph is looked at when there is nothing to write."""
+"""Interval of looking at the graph when there is nothing to write."""
 
 RETRY_S: Final = 2.0
 """Pause after the graph could not be joined, or a message not be written."""

@@ -30,10 +30,10 @@ Interface = Literal["ros2", "rosbridge", "dry-run"]
 """Ways to a vehicle."""
 
 SENTENCE: Final = "The follower will ignore planned stops and obstacles; only the driver's foot stops this vehicle."
-"""What a person has to write, word for word, for a constant speed."""
+"""Text that a person has to write, word for word, for a constant speed."""
 
 LONGEST_DAYS: Final = 31
-"""How far ahead an acknowledgement may last; it is then written anew, or not."""
+"""Longest validity of an acknowledgement, days; it is then written anew, or not."""
 
 FASTEST_MPS: Final = 60.0
 """Above this a limit is a slip of the pen, or of the unit (216 km/h)."""

@@ -17,15 +17,15 @@ from chauffeur.worlds.town.sumo import MAKES, Mover, Sumo
 BRAKING_MPS2: Final = 6.0
 REACTS_S: Final = 0.4
 SIDE_M: Final = 0.3
-"""What is kept clear around the ego."""
+"""Clearance kept around the ego."""
 _NEAR_M: Final = 30.0
-"""Who is no farther away is looked at, and the fast from as far as they need to stand."""
+"""Distance up to which agents are looked at; fast ones from as far as they need to stop."""
 _STEPS: Final = 6
 _STEP_M: Final = 3.0
 """At most so much of their way from one look ahead to the next, so that nobody fast leaps over the ego."""
 _MOST_YAW_RADPS: Final = 0.8
 _CREEP_MPS: Final = 1.0
-"""Who was held to a stand is let go once there is room to go on like this; else it would creep into the ego."""
+"""Speed at which there must be room before a vehicle held to a stand is let go; else it would creep into the ego."""
 
 
 class TrafficBrakes:
@@ -60,7 +60,7 @@ class TrafficBrakes:
 
     @staticmethod
     def _touches(one: Mover, speed_mps: float, yaw_radps: float, ego: VehicleState, away_m: float) -> bool:
-        """True if somebody who goes on as now touches the ego, which goes on as now, before it could stand."""
+        """True if an agent that goes on as now touches the ego, which goes on as now, before it could stand."""
         make = MAKES[one.make]
         lasts = REACTS_S + speed_mps / BRAKING_MPS2
         reach = (speed_mps + ego.speed_mps) * lasts + (make.length_m + ego.length_m) / 2.0 + 2.0 * SIDE_M

@@ -62,20 +62,20 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _CLOSE_M: Final = 1.0
-"""Who stands with its tail over a stop line draws up so close to who is ahead."""
+"""Gap to which a car with its tail over a stop line draws up to the one ahead."""
 _BEFORE_M: Final = 2.2
-"""The front bumper stops so far before somebody's way."""
+"""Distance before an agent's way at which the front bumper stops."""
 _BEFORE_PERSON_M: Final = 3.0
 _GIVES_WAY_MPS: Final = 0.5
-"""Who is as slow as this before a car that is in their way waits for it."""
+"""Speed up to which an agent before a car in its way counts as waiting for it."""
 _CLEAR_S: Final = 1.2
-"""By how much time somebody who crosses is missed by a car that goes first."""
+"""Time by which a car that goes first misses a crossing agent."""
 _AFTER_S: Final = 0.4
 _ACCELERATING_MPS2: Final = 1.5
 _CHANGE_LEAST_M: Final = 14.0
 _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
-"""Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
+"""Distance before a lane's end at which a car waits for a gap, with room left to change lanes."""
 _SEAM_M: Final = 45.0
 """A change that is begun before a seam of the road ends at most so far beyond it."""
 _LANE_BESIDE_M: Final = 5.0
@@ -85,7 +85,7 @@ _EVERY: Final = 2
 """The others are looked at every so many periods."""
 _KERB_M: Final = 2.6
 _WAITS_M: Final = 3.8
-"""Who stands as close to the line as that may be about to cross."""
+"""Distance from the line within which a standing agent may be about to cross."""
 _PEOPLE_MPS: Final = 4.5
 
 
@@ -126,7 +126,7 @@ class TownDriver:
         self._tick = 0
         self.why = ""
         self.lets_go_first = False
-        """Whether it waits, or slows down, for a road user whose way crosses its own."""
+        """True if it waits, or slows down, for a road user whose way crosses its own."""
 
     def head_for(self, route: Route) -> None:
         """Go somewhere else from here on."""

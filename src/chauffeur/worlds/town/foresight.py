@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _STEP_S: Final = 0.5
 TIMES_S: Final = np.arange(0.0, 6.01, _STEP_S)
 _BACK_TO_THE_MIDDLE: Final = np.maximum(0.0, 1.0 - TIMES_S / 3.0)
-"""Who is beside the middle of their lane is back there after 3 s."""
+"""Share of the offset from the lane's middle left at each of `TIMES_S`: none after 3 s."""
 _MOST_DISCS: Final = 5
 _SPREAD: Final = np.array(
     [
@@ -78,7 +78,7 @@ class _LaneWay(NamedTuple):
 
 
 class _Expected(NamedTuple):
-    """A way that somebody may take.
+    """A way that an agent may take.
 
     Attributes:
         other: Who.
@@ -177,7 +177,7 @@ class Foresight:
         return found
 
     def _expected(self, other: VehicleState, lane_stops: set[LaneId]) -> list[_Expected]:
-        """Each way that somebody may take; one of no length for who stands."""
+        """Each way that an agent may take; one of no length for who stands."""
         speed = other.speed_mps
         if speed < (_ON_FOOT_MPS if other.kind == "pedestrian" else _SLOW_MPS):
             return [_Expected(other, _NOWHERE)]
@@ -303,7 +303,7 @@ def _covered(rows: Array, expected: Sequence[_Expected]) -> _Bodies:
 
 
 def _near(bodies: _Bodies, half_width_m: float, x: Array, y: Array) -> NDArray[np.int64]:
-    """Discs that may touch somebody on a line: no other does, by a few of the line's points."""
+    """Discs that may touch an agent on a line: no other does, by a few of the line's points."""
     some = [*range(0, len(x), _COARSE_M), len(x) - 1]
     away = (bodies.x[:, None] - x[some]) ** 2 + (bodies.y[:, None] - y[some]) ** 2
     return np.flatnonzero(away.min(axis=1) < (bodies.radius + half_width_m + _COARSE_M / 2.0 + 0.1) ** 2)

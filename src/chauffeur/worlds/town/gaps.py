@@ -11,11 +11,11 @@ from chauffeur.worlds.town.way import Stretch, first_m
 
 NEAR_M: Final = 70.0
 COMING_S: Final = 5.0
-"""Who is fast is minded from farther away: from as far as it gets in that time."""
+"""Time by which a fast vehicle is minded from farther away: from as far as it gets in it."""
 _ASIDE_M: Final = 8.0
-"""Whose middle is farther than this from a lane is not in it."""
+"""Distance of an agent's middle from a lane beyond which it is not in it."""
 _UPSTREAM_M: Final = 60.0
-"""Who is on a way into a lane that is changed into is minded from so far."""
+"""Distance from which a vehicle on a way into the target lane is minded."""
 _MOST_WAYS: Final = 6
 
 
@@ -58,7 +58,7 @@ class GapAcceptance:
         return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
 
     def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
-        """True if somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
+        """True if a vehicle that is not in a lane yet, but on a way into it, would come too close behind the ego.
 
         Args:
             other: Who.
@@ -83,7 +83,7 @@ class GapAcceptance:
         return False
 
     def _upstream(self, lane: LaneId) -> tuple[Polyline, ...]:
-        """The ways into a lane, as far back as somebody who is fast has to be seen."""
+        """The ways into a lane, as far back as a fast vehicle has to be seen."""
         known = self._into.get(lane)
         if known is None:
             done: list[list[Lane]] = []
@@ -99,6 +99,6 @@ class GapAcceptance:
 
 
 def _behind_m(along_mps: float, ego_mps: float) -> float:
-    """Gap that somebody who comes up from behind needs, by their speed and the ego's."""
+    """Gap that a vehicle coming up from behind needs, by their speed and the ego's."""
     closing = max(0.0, along_mps - ego_mps)
     return 2.5 + 0.7 * along_mps + closing * closing / 4.0

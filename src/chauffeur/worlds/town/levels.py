@@ -15,7 +15,7 @@ from chauffeur.geometry import LaneId
 from chauffeur.geometry.opendrive import OpenDriveMap
 
 APART_M: Final = 3.0
-"""What lies so much higher is another level: no car is as high."""
+"""Height difference that makes another level: no car is as high."""
 STEEPEST: Final = 0.12
 """Grade up to which a road ahead is still the same level: 12 %, the most of urban design guides."""
 _CELL_M: Final = 8.0

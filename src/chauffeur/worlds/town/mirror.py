@@ -12,10 +12,10 @@ from chauffeur.worlds.town.scene import TownScene
 
 
 class TownMirror(TownScene):
-    """A town that nobody steps: its trips begin as the simulated ones do, and go on by instants that it is shown."""
+    """A town never stepped: its trips begin as the simulated ones do, and go on by instants that it is shown."""
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
-        """Be at the start of a trip, nobody else in sight. Raises ScenarioError as the simulated town does."""
+        """Start a trip, with no other agent in sight. Raises ScenarioError as the simulated town does."""
         trip = self._begin(scenario, seed)
         pose = trip.town.road[trip.start.lane].centre.at(trip.start.station_m)
         size = LINCOLN_MKZ.length_m, LINCOLN_MKZ.width_m

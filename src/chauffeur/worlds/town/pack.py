@@ -168,7 +168,7 @@ PLACE_WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "post_office": ("post",),
     "bus_stop": ("bus station",),
 }
-"""What else people call a kind of place."""
+"""Other names of a kind of place."""
 
 
 def places_called(places: Sequence[Place], name: str) -> tuple[Place, ...]:

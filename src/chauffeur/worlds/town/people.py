@@ -39,7 +39,7 @@ class _Walk:
 
 @dataclass(slots=True)
 class Walker:
-    """Somebody on foot."""
+    """A pedestrian."""
 
     id: int
     walk: int
@@ -107,7 +107,7 @@ class People:
                 self._next(walker, walk)
 
     def state(self, walker: Walker) -> VehicleState:
-        """Somebody as others see them."""
+        """The pedestrian as other agents see them."""
         over = walker.over
         pose = self._on_walk(walker) if over is None else over.at(min(walker.at_m, over.length_m))
         x, y, heading = pose.x_m, pose.y_m, pose.heading_rad
@@ -122,7 +122,7 @@ class People:
         return Pose(x, y, heading)
 
     def crosses(self, walker: Walker) -> bool:
-        """True if somebody is on the carriageway."""
+        """True if a pedestrian is on the carriageway."""
         return self._walks[walker.walk].crossing is not None and walker.at_m > 0.0 and walker.over is None
 
     def _in_the_way(self, walker: Walker, vehicles: Sequence[VehicleState]) -> bool:

@@ -254,7 +254,7 @@ _LANDMARKS: Final = (
     ("Lion Hotel", "hotel"), ("City Museum", "museum"), ("Post Office", "post_office"),
 )  # fmt: skip
 PLACE_KINDS: Final = (*(kind for _, kind in _LANDMARKS), "bus_stop")
-"""What places our own towns have."""
+"""Places in our own towns."""
 _STREETS: Final = [
     "Bridge Street", "Castle Street", "Chapel Lane", "Church Street", "Cooper Street", "Elm Street", "Ferry Lane",
     "Garden Street", "George Street", "Grove Road", "Hazel Lane", "Hope Street", "Ivy Lane", "Kiln Lane",

@@ -20,7 +20,7 @@ from chauffeur.worlds.town.trip import TownConfig, TownTrip, goal_in
 
 DT_S: Final = 0.05
 SEES_M: Final = 100.0
-"""Who is farther away is not shown."""
+"""Distance beyond which agents are not shown."""
 _SLOWING_MPS2: Final = 1.5
 """Another way begins where the car could stop by then: a turn nearer than that could not be taken."""
 _ROOM_M: Final = 4.0
@@ -57,7 +57,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
         self._stood: tuple[str, float, float] | None = None
         """The place that was reached, and where the car stood."""
         self._still_s = 0.0
-        """How long the car has stood, s."""
+        """Time the car has stood, s."""
 
     @property
     def engine(self) -> str:
@@ -156,7 +156,7 @@ class TownScene(WorldBase[TownPerception, TownDriver]):
 
     @property
     def _heads_elsewhere(self) -> bool:
-        """True if somebody wished for another place than the scenario's goal."""
+        """True if the passenger wished for another place than the scenario's goal."""
         return bool(self._place) or self._stood is not None
 
     # Looking ----------------------------------------------------------------------------------------------------------

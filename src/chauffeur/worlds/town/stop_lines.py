@@ -27,7 +27,7 @@ _ROOM_BEHIND_M: Final = 5.0
 """Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1."""
 _CLEAR_M: Final = 1.2
 _TO_A_STAND: Final = 5.0
-"""Who is ahead may stand as soon as comfortable braking, 2.5 m/s2, allows: twice that, m/s2."""
+"""Twice the comfortable braking, 2.5 m/s2, by which the vehicle ahead may stop, m/s2."""
 _SERVED_S: Final = 0.7
 _AT_SIGN_M: Final = 3.0
 FIRST_SIGN: Final = 30_001

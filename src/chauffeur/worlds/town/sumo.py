@@ -1,6 +1,6 @@
 """Traffic by Eclipse SUMO, in this process (libsumo): the one module that knows it.
 
-libsumo holds one simulation a process. Whoever opens a `Sumo` takes it over, and the one opened before is told so, in
+libsumo holds one simulation a process. The `Sumo` opened last owns it, and the one opened before is told so, in
 words, when it is used again: worlds that have to run beside each other run in processes of their own.
 """
 
@@ -41,10 +41,10 @@ MAKES: Final[Mapping[str, Make]] = {
     "bicycle": Make("bicycle", 1.8, 0.65, 5.5, 1.2, "bicycle", 0.07),
 }
 JAM_S: Final = 60.0
-"""Who is stuck for so long is taken out, and put in elsewhere."""
+"""Time after which a stuck vehicle is taken out, and put in elsewhere."""
 LANE_CHANGE_S: Final = 3.0
 DECIDES_S: Final = 0.2
-"""How often somebody decides anew: a quick driver's response, and half the work of deciding every period."""
+"""Interval at which a driver decides anew: a quick driver's response, and half the work of deciding every period."""
 _MATCH_M: Final = 20.0
 """A lane for what is moved from outside is looked for this near; SUMO's own 100 m cost it a millisecond."""
 _MINOR: Final = "g"
@@ -93,7 +93,7 @@ def _library() -> Any:
 
 
 _holder: list[Sumo] = []
-"""Whose simulation this process runs: none or one."""
+"""Owner of the simulation that this process runs: none or one."""
 
 
 class Sumo:
@@ -185,7 +185,7 @@ class Sumo:
         return int(self._sumo.edge.getLaneNumber(edge))
 
     def add(self, name: str, make: str, edges: Sequence[str]) -> None:
-        """Somebody sets out on the first of some edges, wherever there is room."""
+        """Insert an agent on the first of some edges, wherever there is room."""
         self._sumo.route.add(f"r-{name}", edges)
         self._sumo.vehicle.add(
             name, f"r-{name}", typeID=make, departLane="best", departPos="random_free", departSpeed="0"
@@ -202,7 +202,7 @@ class Sumo:
         self._sumo.vehicle.setPreviousSpeed(name, speed_mps)
 
     def go_on(self, name: str, edges: Sequence[str]) -> None:
-        """Somebody has another way from the edge it is on."""
+        """Give an agent another way from the edge it is on."""
         self._way_of.pop(name, None)
         try:
             self._sumo.vehicle.setRoute(name, edges)
@@ -210,7 +210,7 @@ class Sumo:
             return
 
     def route_of(self, name: str) -> tuple[str, ...]:
-        """The edges that somebody has before it, its present one first."""
+        """The edges that an agent has before it, its present one first."""
         vehicle = self._sumo.vehicle
         way = self._way_of.get(name)
         if way is None:  # SUMO is asked once for what only `go_on` changes
@@ -238,7 +238,7 @@ class Sumo:
         return tuple(sorted({*stuck, *arrived}))
 
     def remove(self, name: str) -> None:
-        """Take somebody out."""
+        """Take an agent out."""
         self._kind_of.pop(name, None)
         self._way_of.pop(name, None)
         try:
@@ -247,7 +247,7 @@ class Sumo:
             return
 
     def hold(self, name: str, speed_mps: float | None) -> None:
-        """Have somebody drive at a speed, or as it likes again."""
+        """Have an agent drive at a speed, or as it likes again."""
         try:
             self._sumo.vehicle.setSpeed(name, -1.0 if speed_mps is None else speed_mps)
         except self._sumo.libsumo.TraCIException:  # it has gone meanwhile

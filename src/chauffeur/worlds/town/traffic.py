@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 DENSITY_PER_KM: Final = 8.0
 """Vehicles per km of lane at most: above that, small towns stand still (see docs/town.md)."""
 STUCK_PERIODS: Final = 2400
-"""Who has got nowhere for so many periods (120 s) is taken out, and put in elsewhere: CARLA clears jams alike."""
+"""Periods (120 s) without progress after which a car is taken out, and put in elsewhere: CARLA clears jams alike."""
 _NOWHERE_M: Final = 20.0
 """Two cars' lengths a cycle of the lights and less is no queue but a jam, which spreads over a small town."""
 _WAY_M: Final = 1200.0
 _FEW: Final = 3
 _EVERY: Final = 40
-"""How often, in periods, somebody's way is looked at."""
+"""Interval, in periods, of looking at an agent's way."""
 
 
 class Traffic:
@@ -64,7 +64,7 @@ class Traffic:
                 self._sumo.go_on(name, [*route[:-1], *self._way(route[-1])])
 
     def _stuck(self, name: str) -> bool:
-        """True if somebody has got nowhere for longer than any red light lasts."""
+        """True if an agent has got nowhere for longer than any red light lasts."""
         driven = self._sumo.driven_m(name)
         since, before = self._moved.get(name, (self._tick, driven))
         if driven - before > _NOWHERE_M:

@@ -279,7 +279,7 @@ class TownWorld(TownScene):
             self._puppet(actor.id, actor.pose, actor.length_m, actor.width_m)
 
     def _puppet(self, number: int, pose: Pose, length_m: float, width_m: float) -> None:
-        """Somebody on the carriageway as SUMO's traffic sees them: a small vehicle."""
+        """Agent on the carriageway as SUMO's traffic sees it: a small vehicle."""
         assert self._sumo is not None
         place = self.town.road.locate(pose.x_m, pose.y_m, None, ("driving",))
         near = place is not None and abs(place.offset_m) < (
@@ -421,7 +421,7 @@ class TownWorld(TownScene):
         return self._colours[number]
 
     def _on_another_level(self, lane: LaneId | None, x_m: float, y_m: float, ego: Pose) -> bool:
-        """True if somebody in a lane is over the ego, or under it."""
+        """True if an agent in a lane is over the ego, or under it."""
         if lane is None or self._lane is None:
             return False
         if self.town.levels.all_level(self._lane, self._ego_station, lane):

@@ -31,7 +31,7 @@ CREEP_MPS: Final = 0.5
 a car that stands."""
 _VEHICLE: Final = 2
 _WHEELS: Final[dict[Plant, tuple[int, int]]] = {"st": (7, 7), "std": (7, 9), "mb": (23, 27)}
-"""Where the angular speeds of the wheels are in the state."""
+"""Slice of the wheels' angular speeds in the state."""
 
 TRACTION_MPS2: Final = 3.9
 """Hardest acceleration on a dry road that traction control lets through: half the weight is on driven wheels."""

@@ -102,7 +102,7 @@ class TrackWorld(WorldBase[ObservedPerception, LaneDriver]):
         self._state = np.zeros(7)
         self._acceleration = 0.0
         self._lost = False
-        """Whether the model yielded no numbers: a car beyond what it was made for."""
+        """True if the model yielded no numbers: a car beyond what it was made for."""
         self._wander = np.zeros(2)
         self._rng = np.random.default_rng(0)
         self._tick = 0

@@ -106,7 +106,7 @@ PLAN, MANIFEST = "plan.json", "manifest.json"
 
 @dataclass(frozen=True, slots=True)
 class SuiteConfig:
-    """What decides a suite.
+    """Settings that decide a suite.
 
     Attributes:
         n: Items of the main suite.

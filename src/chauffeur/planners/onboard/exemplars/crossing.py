@@ -47,7 +47,7 @@ CROSSING: Final[dict[str, dict[str, float]]] = {
 """Numbers by direction: speeds in m/s, distances in m, times in s, accelerations in m/s2."""
 
 ON_THE_WAY_M: Final = -45.0
-"""How far behind the middle of the crossing a step ends when another one follows."""
+"""Distance behind the middle of the crossing at which a step ends when another one follows."""
 DONE_M: Final = -300.0
 """And when none does."""
 

@@ -224,7 +224,7 @@ def steer_to(lanes: Array, traits: Array, floats: Array, i: int, lane: int) -> f
 
 @compiled
 def _abort_change(lanes: Array, traits: Array, floats: Array, ints: Array, scene: Array, i: int) -> None:
-    """Give a lane change up if somebody else close ahead is changing into the same lane."""
+    """Give a lane change up if another vehicle close ahead is changing into the same lane."""
     lane, target = ints[i, LANE], ints[i, TARGET_LANE]
     if traits[lane, ROAD] != traits[target, ROAD]:
         return
