@@ -298,7 +298,7 @@ def test_a_model_that_knows_the_future_scores_nothing(tmp_path: Path) -> None:
 
 def test_failures_are_counted_both_ways(tmp_path: Path) -> None:
     answers = iter(["I would rather not."] + [waypoints_text(PATH)] * 30)
-    _, rows = run(write_nuscenes(tmp_path), Scripted(lambda text: next(answers)), scenes="", limit=8)
+    _, rows = run(write_nuscenes(tmp_path), Scripted(lambda text: next(answers)), scene_list="", limit=8)
     assert [row["status"] for row in rows].count("unreadable") == 1
     assert fill(TABLE_XII, rows).cells[1][-1] == f"{100 / 8:.2f}"
     kept, counted = (fill(OpenLoopBenchmark.tables[place], rows).lines[-1].found[2].value for place in (0, 1))
@@ -355,7 +355,8 @@ def test_a_picture_that_is_missing_costs_its_own_frame(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"setting": "guessing"}, {"shown": "nothing"}, {"every": 0}, {"version": "v9"}, {"scenes": "no-file"}]
+    "options",
+    [{"setting": "guessing"}, {"shown": "nothing"}, {"stride": 0}, {"tables": "v9"}, {"scene_list": "no-file"}],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path: Path, options: dict[str, Any]) -> None:
     write_nuscenes(tmp_path)

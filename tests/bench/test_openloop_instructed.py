@@ -239,7 +239,7 @@ def test_navigation_is_still_read_off_the_first_three_seconds(data: Path) -> Non
 
 @pytest.mark.parametrize(
     ("options", "error"),
-    [({"setting": "sft"}, ConfigError), ({"scenes": "none"}, DataError), ({"every": 0}, ConfigError)],
+    [({"setting": "sft"}, ConfigError), ({"scene_list": "none"}, DataError), ({"stride": 0}, ConfigError)],
 )
 def test_what_cannot_be_asked_is_refused(data: Path, options: dict[str, Any], error: type[Exception]) -> None:
     with pytest.raises(error):

@@ -11,7 +11,16 @@ import typer
 from chauffeur.cli.bench_plugin import BenchGroup
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.options import BaseUrl
+from chauffeur.cli.options import (
+    BaseUrl,
+    Concurrency,
+    MaxRequests,
+    MaxUsd,
+    Price,
+    RayCluster,
+    ShardPart,
+    Workers,
+)
 from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:
@@ -37,8 +46,6 @@ MERGE_EXAMPLES = help_text("bench MERGE_EXAMPLES")
 _NAME: Final = 30
 """Longest planner name that leaves a table its columns; of a longer one the end is shown."""
 
-_HOW = "Pace and budget (change no row)"
-_WHERE = "Where it runs (changes no row)"
 MetricsOption = Annotated[
     str, typer.Option("--metrics", help="`origin` (LaMPilot's code) or `paper` (its equations as printed).")
 ]
@@ -73,40 +80,13 @@ def lampilot(
     ] = False,
     metrics: MetricsOption = "origin",
     base_url: BaseUrl = None,
-    concurrency: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            envvar="CHAUFFEUR_CONCURRENCY",
-            help="Planner calls in flight at most, fewer while refused; 1 for a server of one slot.",
-            rich_help_panel=_HOW,
-        ),
-    ] = 16,
-    max_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=_HOW)
-    ] = None,
-    max_requests: Annotated[
-        int | None, typer.Option(min=0, help="Budget of the run in requests to the endpoint.", rich_help_panel=_HOW)
-    ] = None,
-    price: Annotated[
-        str | None,
-        typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=_HOW),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Simulation processes; default one per core.", rich_help_panel=_WHERE)
-    ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            help="Only part i of n: `3/8`, `auto` in a Slurm array, `auto/8` in an indexed job.", rich_help_panel=_WHERE
-        ),
-    ] = None,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            help="Simulate on a Ray cluster: `local`, `auto`, `ray://...` or host:port.", rich_help_panel=_WHERE
-        ),
-    ] = None,
+    concurrency: Concurrency = 16,
+    max_usd: MaxUsd = None,
+    max_requests: MaxRequests = None,
+    price: Price = None,
+    workers: Workers = None,
+    shard: ShardPart = None,
+    ray: RayCluster = None,
 ) -> None:
     """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
     from chauffeur.bench.kernel.shards import WHOLE, Shard
@@ -141,10 +121,8 @@ def passengers(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
     setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
     base_url: BaseUrl = None,
-    concurrency: Annotated[
-        int, typer.Option(min=1, envvar="CHAUFFEUR_CONCURRENCY", help="Planner calls in flight at most.")
-    ] = 16,
-    workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
+    concurrency: Concurrency = 16,
+    workers: Workers = None,
 ) -> None:
     """Hand-written wishes with the right outcome each: driven, asked back about, or refused."""
     from chauffeur.bench.lampilot.runner import LampilotRun

@@ -20,12 +20,20 @@ from typer.core import TyperGroup
 
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.cli.examples import help_text_or_none
-from chauffeur.cli.options import ASKING, BaseUrl, MaxRequests, MaxUsd, Price
+from chauffeur.cli.options import (
+    BaseUrl,
+    Concurrency,
+    MaxRequests,
+    MaxUsd,
+    Price,
+    RayCluster,
+    ShardPart,
+    Workers,
+)
 from chauffeur.concept import ConfigError
 from chauffeur.concept.registry import load_plugin, plugin_names
 
 GROUP = "chauffeur.benchmarks"
-_WHERE: Final = "Where it runs (changes no row)"
 _ABOUT: Final = {
     "faithfulness": (
         "Are explanations that misstate their program found?",
@@ -126,9 +134,9 @@ def command_of(name: str) -> Any:
     named = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in ordered]
     run.__signature__ = inspect.Signature(named)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *shared]}
-    about = _first_line(make) if name not in _ABOUT else _ABOUT[name][1]
+    about = _about(name)[1] if name in _ABOUT else _first_line(make) or _about(name)[1]
     app = typer.Typer(rich_markup_mode="markdown", add_completion=False)
-    app.command(name, help=about or _about(name)[1], epilog=help_text_or_none(f"bench_{name}"))(run)
+    app.command(name, help=about, epilog=help_text_or_none(f"bench_{name}"))(run)
     return typer.main.get_command(app)
 
 
@@ -138,28 +146,13 @@ def _shared(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; one begun there is continued.")] = None,
     base_url: BaseUrl = None,
-    concurrency: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            envvar="CHAUFFEUR_CONCURRENCY",
-            help="Calls in flight at most, fewer while refused.",
-            rich_help_panel=ASKING,
-        ),
-    ] = 16,
+    concurrency: Concurrency = 16,
     max_usd: MaxUsd = None,
     max_requests: MaxRequests = None,
     price: Price = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Worker processes; default one per core.", rich_help_panel=_WHERE)
-    ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(help="Only part i of n; without it, what shards have done is taken over.", rich_help_panel=_WHERE),
-    ] = None,
-    ray: Annotated[
-        str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.", rich_help_panel=_WHERE)
-    ] = None,
+    workers: Workers = None,
+    shard: ShardPart = None,
+    ray: RayCluster = None,
 ) -> None:
     """Declare what every benchmark's command takes beside its own options."""
 
@@ -169,15 +162,20 @@ _OF_ASKING: Final = frozenset({"planner", "base_url", "concurrency", *_BUDGET})
 
 
 def own_options(make: Any) -> list[inspect.Parameter]:
-    """The options of a benchmark: a parameter each of its class or function, with the sentence of its docstring."""
-    target = make.__init__ if isinstance(make, type) else make
+    """The options of a benchmark: a parameter each of its class or function, with the sentence of its docstring.
+
+    A function that hands `**options` on has those of the class that it returns, too.
+    """
     try:
-        hints, parameters = get_type_hints(target), inspect.signature(make).parameters
+        hints, parameters = (
+            get_type_hints(make.__init__ if isinstance(make, type) else make),
+            inspect.signature(make).parameters.values(),
+        )
     except (TypeError, ValueError, NameError):
         return []
     said = _arguments(make)
-    return [
-        inspect.Parameter(
+    found = {
+        one.name: inspect.Parameter(
             one.name,
             inspect.Parameter.KEYWORD_ONLY,
             default=one.default,
@@ -185,9 +183,12 @@ def own_options(make: Any) -> list[inspect.Parameter]:
                 _kind(hints.get(one.name, str)), typer.Option(*_flag(one.name), help=said.get(one.name, ""))
             ],
         )
-        for one in parameters.values()
+        for one in parameters
         if one.kind not in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-    ]
+    }
+    if any(one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters) and isinstance(hints.get("return"), type):
+        found |= {one.name: one for one in own_options(hints["return"]) if one.name not in found}
+    return list(found.values())
 
 
 def _flag(name: str) -> tuple[str, ...]:
@@ -221,7 +222,7 @@ def _first_line(make: Any) -> str:
 
 
 def asks(make: Any) -> bool:
-    """Whether somebody is asked, as far as the class tells (that of the result, where a function makes it)."""
+    """True if a planner or model is asked, as far as the class tells: that of the result, where a function makes it."""
     kind = make if isinstance(make, type) else get_type_hints(make).get("return") if callable(make) else type(make)
     takes_planner = not isinstance(make, type) and "planner" in inspect.signature(make).parameters
     return bool(getattr(kind, "asks", "plans")) or takes_planner

@@ -27,7 +27,7 @@ def sft(
     from chauffeur.cli.console import stdout
     from chauffeur.drive.files import publish
 
-    bench = OpenLoopBenchmark(str(data), tables, "sft", scenes=str(scene_list or ""), every=stride)
+    bench = OpenLoopBenchmark(str(data), tables, "sft", scene_list=str(scene_list or ""), stride=stride)
     lines = [*training_lines((one for one in bench.samples if one.whole), data)]
     publish(out, "".join(lines).encode(), "lines for fine-tuning")
     stdout().print(f"{len(lines):,} lines in {out}; pictures are named below {data}.", soft_wrap=True)

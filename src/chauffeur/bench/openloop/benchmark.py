@@ -240,25 +240,25 @@ class OpenLoopBenchmark:
     def __init__(
         self,
         data: str,
-        version: str = "",
-        setting: str = "zero-shot",
-        shown: str = "pictures",
-        scenes: str = "",
-        side: int = 448,
+        tables: str = "",
+        setting: OpenLoopSetting = "zero-shot",
+        shown: Shown = "pictures",
+        scene_list: str = "",
+        side_px: int = 448,
         limit: int = 0,
-        every: int = 1,
+        stride: int = 1,
     ) -> None:
         """Make it.
 
         Args:
             data: Folder that holds the version's folder of tables, and `samples`.
-            version: E.g. `v1.0-mini`; default the only one there, or `v1.0-test` of a set of ours.
+            tables: E.g. `v1.0-mini`; default the only ones there, or `v1.0-test` of a set of ours.
             setting: `zero-shot`, `chain-of-thought` or `sft`.
             shown: `pictures`, or `blank` (grey ones).
-            scenes: File with names of scenes, one a line: nuScenes' own splits are lists of names. Default all.
-            side: Longer side in px that pictures are scaled down to; 0 leaves them.
+            scene_list: File with names of scenes, one a line: nuScenes' own splits are lists of names. Default all.
+            side_px: Longer side in px that pictures are scaled down to; 0 leaves them.
             limit: Only the first so many frames; 0 for all.
-            every: Only every so many-th frame.
+            stride: Only every so many-th frame.
 
         Raises:
             ConfigError: An option makes no sense.
@@ -269,15 +269,17 @@ class OpenLoopBenchmark:
             raise ConfigError(f"There is no setting {setting!r}.", hint=f"Choose of: {known}.")
         if shown not in get_args(Shown):
             raise ConfigError(f"Nothing is shown as {shown!r}.", hint="Choose pictures or blank.")
-        if every < 1 or limit < 0:
-            raise ConfigError(f"every={every} and limit={limit} make no sense.", hint="Give 1 or more, and 0 or more.")
-        self._setting: OpenLoopSetting = cast("OpenLoopSetting", setting)
-        self._shown: Shown = cast("Shown", shown)
-        self._side = side
+        if stride < 1 or limit < 0:
+            raise ConfigError(
+                f"stride={stride} and limit={limit} make no sense.", hint="Give 1 or more, and 0 or more."
+            )
+        self._setting: OpenLoopSetting = setting
+        self._shown: Shown = shown
+        self._side = side_px
         root = Path(data)
-        self.tables_read = NuScenesTables(root, version or _only_version(root))
-        names, digest = _names(scenes)
-        self.samples = self.asked_about(self.tables_read.samples(names, self.steps))[::every][: limit or None]
+        self.tables_read = NuScenesTables(root, tables or _only_version(root))
+        names, digest = _names(scene_list)
+        self.samples = self.asked_about(self.tables_read.samples(names, self.steps))[::stride][: limit or None]
         if not self.samples:
             raise DataError(f"{self.tables_read.folder} has no frame with 2 s before it.")
         self.own = self.tables_read.marks is not None
@@ -288,9 +290,9 @@ class OpenLoopBenchmark:
             "scenes": digest,
             "setting": setting,
             "shown": shown,
-            "side_px": side,
+            "side_px": side_px,
             "limit": limit,
-            "every": every,
+            "every": stride,
             "command": "navigation" if self.own else "read off the true future, as ST-P3 and UniAD do",
             "asking": ASKING,
             "reading": READING,
@@ -381,7 +383,7 @@ def _only_version(root: Path) -> str:
         return "v1.0-test"
     if len(found) != 1:
         there = ", ".join(found) or "none"
-        raise DataError(f"{root} has not one version of nuScenes' tables (there: {there}).", hint="Set version=NAME.")
+        raise DataError(f"{root} has not one version of nuScenes' tables (there: {there}).", hint="Name its tables.")
     return found[0]
 
 

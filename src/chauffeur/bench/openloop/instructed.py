@@ -30,7 +30,7 @@ from chauffeur.bench.openloop.conventions import distances, standing
 from chauffeur.bench.openloop.doscenes import INSTRUCTION_KINDS, SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.nuscenes import PlanningSample
-from chauffeur.bench.openloop.requests import OpenLoopSetting, Shown
+from chauffeur.bench.openloop.requests import OpenLoopSetting
 from chauffeur.concept import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
         _by_method("The challenge's Q97.5: without the 2.5 % of scenes with the highest ADE", _FILTERED),
     )
 
-    def __init__(self, data: str, instructions: str, setting: str = "zero-shot", **options: Any) -> None:
+    def __init__(self, data: str, instructions: str, setting: OpenLoopSetting = "zero-shot", **options: Any) -> None:
         """Make it.
 
         Args:
@@ -348,36 +348,16 @@ def _errors(predicted: FloatArray, truth: FloatArray) -> tuple[float | None, flo
     return round(float(away.mean()), 4), round(float(away[-1]), 4)
 
 
-def openloop(
-    data: str,
-    instructions: str = "",
-    tables: str = "",
-    setting: OpenLoopSetting = "zero-shot",
-    shown: Shown = "pictures",
-    scene_list: str = "",
-    side_px: int = 448,
-    limit: int = 0,
-    stride: int = 1,
-) -> OpenLoopBenchmark:
+def openloop(data: str, instructions: str = "", **options: Any) -> OpenLoopBenchmark:
     """Make the benchmark over 3 s, or with instructions the one over 6 s.
 
     Args:
         data: Folder with nuScenes' tables and `samples`.
         instructions: doScenes' annotations (folder or file): 6 s ahead, with each instruction and without.
-        tables: E.g. v1.0-mini; default the only ones there.
-        setting: How it is asked.
-        shown: The real pictures, or grey ones.
-        scene_list: File with the names of scenes, one a line.
-        side_px: Longer side of the pictures in px; 0 as they are.
-        limit: Only the first so many frames; 0 for all.
-        stride: Only every so many-th frame.
+        options: The others of OpenLoopBenchmark.
 
     Raises:
         ConfigError: An option makes no sense.
         DataError: Files cannot be read, or hold no frame that can be asked about.
     """
-    options: dict[str, Any] = {
-        "version": tables, "setting": setting, "shown": shown, "scenes": scene_list, "side": side_px, "limit": limit,
-        "every": stride,
-    }  # fmt: skip
     return InstructedBenchmark(data, instructions, **options) if instructions else OpenLoopBenchmark(data, **options)

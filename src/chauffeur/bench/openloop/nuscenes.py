@@ -150,7 +150,7 @@ class NuScenesTables:
         self.root, self.folder = root, root / version
         if not self.folder.is_dir():
             known = ", ".join(sorted(one.parent.name for one in root.glob("*/sample.json"))) or "none"
-            raise DataError(f"{root} has no version {version!r}.", hint=f"There: {known}. Set version=NAME.")
+            raise DataError(f"{root} has no version {version!r}.", hint=f"There: {known}. Name its tables.")
         digest = hashlib.sha256()
         self._tables = {name: self._read(name, digest) for name in TABLES}
         marks = self.folder / MARKS
