@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 
 from chauffeur.concept import Limits, Observation, Trajectory
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.executors.trajectory import TrajectoryExecutor
 from chauffeur.geometry import Polyline, Pose, joined, wrap_to_pi
 from chauffeur.safety.trajectories import trajectory_faults

@@ -30,7 +30,7 @@ from shapely.geometry import LineString, Polygon
 
 from chauffeur.concept import Command, Observation, Scenario, VehicleState
 from chauffeur.concept.weather import WEATHERS
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.base import World

@@ -17,9 +17,9 @@ from pathlib import Path
 
 from chauffeur.concept import NOBODY, Limits, Plan
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.drive.emergency import EMERGENCY_PLANNER
-from chauffeur.drive.scenarios import find, planner_for
-from chauffeur.drive.session import Session, parse_wish
+from chauffeur.driving.emergency import EMERGENCY_PLANNER
+from chauffeur.driving.scenarios import find, planner_for
+from chauffeur.driving.session import Session, parse_wish
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 

@@ -22,12 +22,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Role, Runtime
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.live.messages import Report
+from chauffeur.driving.live.settings import Settings
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.live.supervisor import Role, Runtime
+from chauffeur.driving.scenarios import find
 
 SCENARIOS = ("overtake", "following", "left-lane", "emergency-lane", "intersection")
 WISHES = ("Overtake the car in front of you.", "Slow down a bit.", "Keep 30 m to the car ahead.", "I'm in a hurry.",

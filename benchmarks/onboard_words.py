@@ -36,8 +36,8 @@ from chauffeur.concept import (
     Thoughts,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import check_drive
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import check_drive
 from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
 from chauffeur.models.onboard.pipeline import examples_of

@@ -30,7 +30,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from chauffeur.concept import Command, Lane, Limits, Scenario, Setpoints, VehicleState
-from chauffeur.drive.episode import run_episode
+from chauffeur.driving.episode import run_episode
 from chauffeur.executors.base import HeldSetpoints
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD, SHIELD_VERSION, Shield

@@ -28,12 +28,12 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.asr_process import AsrEngine
-from chauffeur.drive.talk.messages import Conversation, HeardWords, Note, Said, Say, Scene, StageTimes
-from chauffeur.drive.talk.session import Talk
+from chauffeur.driving.live.settings import Settings
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.talk.asr_process import AsrEngine
+from chauffeur.driving.talk.messages import Conversation, HeardWords, Note, Said, Say, Scene, StageTimes
+from chauffeur.driving.talk.session import Talk
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples, decode
 
 SLOWER = (

@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import Command, Scenario
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.geometry import LaneId, Polyline, Pose
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld

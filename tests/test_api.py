@@ -20,7 +20,7 @@ from server import ModelServer
 
 import chauffeur
 from chauffeur.concept import ConfigError, InstructionError, ScenarioError
-from chauffeur.drive.recording import read_trip
+from chauffeur.driving.recording import read_trip
 
 ROOT = Path(__file__).resolve().parents[1]
 _PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -127,9 +127,9 @@ def test_a_benchmark_is_run_and_gone_on_with(
 
 def test_errors_are_told_before_anything_moves(tmp_path: Path) -> None:
     with pytest.raises(InstructionError, match="empty"):
-        chauffeur.drive_wish(" ")
+        chauffeur.drive(" ")
     with pytest.raises(ScenarioError, match="moon"):
-        chauffeur.drive_wish("Overtake.", scenario="moon")
+        chauffeur.drive("Overtake.", scenario="moon")
     with pytest.raises(ConfigError, match="no_such"):
         chauffeur.run_benchmark("no_such", out=tmp_path / "run")
     assert not (tmp_path / "run").exists()

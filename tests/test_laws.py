@@ -13,7 +13,7 @@ import chauffeur
 
 SOURCE = Path(chauffeur.__file__).parent
 
-STEPS_A_WORLD = {"drive/actuate.py"}
+STEPS_A_WORLD = {"driving/actuate.py"}
 """Law 1: the only module that hands a command to a world."""
 
 STEPS_ITS_OWN = {
@@ -27,7 +27,7 @@ STEPS_ITS_OWN = {
 and the town that steps SUMO and the people in it."""
 
 STEPS_AN_EXECUTOR = {
-    "drive/conformance.py", "drive/episode.py", "drive/live/control.py", "drive/live/policy.py",
+    "driving/conformance.py", "driving/episode.py", "driving/live/control.py", "driving/live/policy.py",
 }  # fmt: skip
 """Ask an executor for its command, and hand it to the one door; the policy process, which goes along on a copy of the
 world that nobody steps, hands it to nobody."""
@@ -73,14 +73,14 @@ def _calls(path: Path, attribute: str) -> list[int]:
 def test_one_door_to_the_actuator() -> None:
     doors = {str(p.relative_to(SOURCE)) for p in _sources() if _calls(p, "step")}
     assert doors - STEPS_AN_OPTIMISER - STEPS_AN_EXECUTOR == STEPS_A_WORLD | STEPS_ITS_OWN
-    assert len(_calls(SOURCE / "drive" / "actuate.py", "step")) == 1
-    hands = {str(p.relative_to(SOURCE)) for p, source in _sources().items() if "drive.actuate import" in source.text}
+    assert len(_calls(SOURCE / "driving" / "actuate.py", "step")) == 1
+    hands = {str(p.relative_to(SOURCE)) for p, source in _sources().items() if "driving.actuate import" in source.text}
     # Trips in simulated time, in real time, a judge who replays what was commanded, routes with scenarios (driven,
     # taught, and bounded as planned), the traffic that frames are taken of, and the kit that tries an executor.
     assert hands == {
-        "drive/conformance.py",
-        "drive/episode.py",
-        "drive/live/control.py",
+        "driving/conformance.py",
+        "driving/episode.py",
+        "driving/live/control.py",
         "bench/leaderboard/instructed.py",
         "bench/leaderboard/lessons.py",
         "bench/leaderboard/rollout.py",
@@ -103,7 +103,7 @@ def test_nothing_runs_model_text_in_this_interpreter() -> None:
 
 
 def test_the_loop_fits_on_a_page() -> None:
-    assert len((SOURCE / "drive" / "loop.py").read_text(encoding="utf-8").splitlines()) < 100
+    assert len((SOURCE / "driving" / "loop.py").read_text(encoding="utf-8").splitlines()) < 100
 
 
 def test_package_files_hand_names_on_and_define_nothing() -> None:
@@ -125,7 +125,7 @@ def test_a_class_name_is_defined_once() -> None:
 
 
 REQUESTS_MADE = {
-    "drive/planning.py",  # for drives and benchmarks, screened
+    "driving/planning.py",  # for drives and benchmarks, screened
     "bench/hostile/requests.py",  # what screening is worth is measured without it, too
     "bench/lampilot/shown.py",  # of a trip that is filed; nobody is asked
     "models/vlm/lora.py",  # of a training pair; nobody is asked
@@ -169,12 +169,12 @@ READS_WORDS = {
     "cli/talk_drive.py": "leave is taken of a session: a closed class of words",
     "cli/vehicle_desk.py": "leave is taken of a session: a closed class of words",
     "describe/answers.py": "what a question is about; acts say only that it is one",
-    "drive/live/plan_messages.py": "what is said aside, until the session holds an utterance",
-    "drive/onroad/checks.py": "to engage the vehicle is no act, and never done",
-    "drive/onroad/session.py": "what is said aside, until the session holds an utterance",
-    "drive/planning.py": "what is a question, until the request holds an utterance",
-    "drive/scenarios.py": "whether a wish is one that a scenario is listed with",
-    "drive/talk/session.py": "leave is taken of a session: a closed class of words",
+    "driving/live/plan_messages.py": "what is said aside, until the session holds an utterance",
+    "driving/onroad/checks.py": "to engage the vehicle is no act, and never done",
+    "driving/onroad/session.py": "what is said aside, until the session holds an utterance",
+    "driving/planning.py": "what is a question, until the request holds an utterance",
+    "driving/scenarios.py": "whether a wish is one that a scenario is listed with",
+    "driving/talk/session.py": "leave is taken of a session: a closed class of words",
     "memory/conflicts.py": "numbers to keep and numbers to change by, until acts are read as well",
     "memory/feedback.py": "opinions, until acts of feedback are read as well",
     "memory/phrases.py": "opinions, until acts of feedback are read as well",

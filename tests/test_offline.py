@@ -84,11 +84,11 @@ def test_driving_talking_and_benching_open_no_connection_and_leave_nothing_of_an
         (cache / "chauffeur" / folder.name).symlink_to(folder)
     talk = """
 import time
-from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.session import Talk
-from chauffeur.drive.talk.messages import Say
+from chauffeur.driving.live.settings import Settings
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.talk.session import Talk
+from chauffeur.driving.talk.messages import Say
 if __name__ == "__main__":
     with Talk(Settings((Start(find("overtake"), 17),), planner="onboard"), print) as session:
         session.take(Say("Overtake the car in front of you."))

@@ -35,9 +35,9 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
-from chauffeur.drive.loop import Stages, drive
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.driving.loop import Stages, drive
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import Forgetful, check_drive, declined, drive_policy, make_trip, make_world
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks

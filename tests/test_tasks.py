@@ -18,7 +18,7 @@ from server import ModelServer
 
 from chauffeur.cli.main import app
 from chauffeur.concept import Program
-from chauffeur.drive.recording import read_trip
+from chauffeur.driving.recording import read_trip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SUITE = "chauffeur bench scenes generate --out suite --items 8 --extras 0"

@@ -1,8 +1,8 @@
 """Chauffeur: a passenger says what they want; the car does it, safely, says why, and remembers.
 
-What most programs need stands here: `drive_wish`, `run_benchmark`, and what a planner of one's own is made of.
+What most programs need stands here: `drive`, `run_benchmark`, and what a planner of one's own is made of.
 
->>> chauffeur.drive_wish("Change to the left lane.", scenario="cruise").trip.plan.intent
+>>> chauffeur.drive("Change to the left lane.", scenario="cruise").trip.plan.intent
 'lane.left'
 """
 
@@ -13,7 +13,7 @@ from chauffeur.telemetry import switch_off
 from chauffeur.version import __version__
 
 if TYPE_CHECKING:
-    from chauffeur.api import drive_wish, drive_wish_async, run_benchmark
+    from chauffeur.api import drive, drive_async, run_benchmark
     from chauffeur.concept import ChauffeurError, Parameters, Plan, PlanRequest, Program, Scenario, Thoughts
     from chauffeur.hmi.notebook import Drive
     from chauffeur.planners.base import Answerer, Planner
@@ -31,8 +31,8 @@ __all__ = [
     "Scenario",
     "Thoughts",
     "__version__",
-    "drive_wish",
-    "drive_wish_async",
+    "drive",
+    "drive_async",
     "make_planner",
     "run_benchmark",
 ]
@@ -40,7 +40,7 @@ __all__ = [
 switch_off()
 
 _HOMES: Final = {
-    "chauffeur.api": ("drive_wish", "drive_wish_async", "run_benchmark"),
+    "chauffeur.api": ("drive", "drive_async", "run_benchmark"),
     "chauffeur.concept": ("ChauffeurError", "Parameters", "Plan", "PlanRequest", "Program", "Scenario", "Thoughts"),
     "chauffeur.hmi.notebook": ("Drive",),
     "chauffeur.planners.base": ("Answerer", "Planner"),

@@ -15,10 +15,10 @@ from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario
-from chauffeur.drive import event_loop
-from chauffeur.drive.recording import write_trip
-from chauffeur.drive.scenarios import find, planner_for, suiting
-from chauffeur.drive.session import Forgetful, Session, parse_wish
+from chauffeur.driving import event_loop
+from chauffeur.driving.recording import write_trip
+from chauffeur.driving.scenarios import find, planner_for, suiting
+from chauffeur.driving.session import Forgetful, Session, parse_wish
 from chauffeur.hmi.notebook import Drive, Rows
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.personal_limits import personal_limits
@@ -27,7 +27,7 @@ from chauffeur.planners.registry import make_answerer, make_planner
 from chauffeur.planners.talk2drive.recent import fitting
 
 
-def drive_wish(
+def drive(
     wish: str,
     *,
     scenario: str | Scenario = "",
@@ -38,7 +38,7 @@ def drive_wish(
 ) -> Drive:
     """Drive one wish in simulation: plan it, check it, drive it, score it.
 
-    >>> chauffeur.drive_wish("Change to the left lane.", scenario="cruise").trip.outcome
+    >>> chauffeur.drive("Change to the left lane.", scenario="cruise").trip.outcome
     'success'
 
     Args:
@@ -61,7 +61,7 @@ def drive_wish(
     return event_loop.run(_drive(wish, scenario, planner, person, seed, save))
 
 
-async def drive_wish_async(
+async def drive_async(
     wish: str,
     *,
     scenario: str | Scenario = "",
@@ -70,11 +70,11 @@ async def drive_wish_async(
     seed: int | None = None,
     save: Path | str | None = None,
 ) -> Drive:
-    """Drive one wish as `drive_wish` does, while the caller's event loop goes on.
+    """Drive one wish as `drive` does, while the caller's event loop goes on.
 
     The drive has a thread and an event loop of its own, in which a planner is asked.
 
-    >>> asyncio.run(chauffeur.drive_wish_async("Change to the left lane.", scenario="cruise")).trip.outcome
+    >>> asyncio.run(chauffeur.drive_async("Change to the left lane.", scenario="cruise")).trip.outcome
     'success'
     """
     return await event_loop.run_aside(_drive(wish, scenario, planner, person, seed, save))

@@ -22,9 +22,9 @@ from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
-from chauffeur.drive.again import drive_again
-from chauffeur.drive.recording import RecordedTrip, compare_trips, read_trip, write_trip
-from chauffeur.drive.session import declined, drive_policy, make_trip, make_world, trip_s
+from chauffeur.driving.again import drive_again
+from chauffeur.driving.recording import RecordedTrip, compare_trips, read_trip, write_trip
+from chauffeur.driving.session import declined, drive_policy, make_trip, make_world, trip_s
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.memory.policies_entry import content_id

@@ -13,8 +13,8 @@ from typer.testing import CliRunner, Result
 from chauffeur.cli.audit import audit_app, auditor_for, tell_closing
 from chauffeur.cli.failures import FriendlyGroup
 from chauffeur.concept import ConfigError, Instruction, PersonId
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.scenarios import find
 from chauffeur.safety.audit import AuditLog, Closing, head_path
 
 KEY = b"a key of thirty-two bytes, quite"

@@ -23,7 +23,7 @@ from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.concept.extras import install_command
-from chauffeur.drive.recording import read_trip, write_trip
+from chauffeur.driving.recording import read_trip, write_trip
 from chauffeur.version import __version__
 
 WISH = "Change to the left lane."
@@ -351,7 +351,7 @@ def test_ctrl_c_is_130(monkeypatch: pytest.MonkeyPatch) -> None:
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chauffeur.drive.scenarios.suiting", stop)
+    monkeypatch.setattr("chauffeur.driving.scenarios.suiting", stop)
     assert invoke("drive", "go").exit_code == 130
 
 

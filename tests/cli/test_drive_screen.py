@@ -17,9 +17,9 @@ from chauffeur.cli.compilation import CompilationNotice
 from chauffeur.cli.parts import planner_named
 from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import Instruction, Limits, Program, Verdict
-from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import Session
+from chauffeur.driving.recording import RecordedTrip
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import Session
 from chauffeur.hmi import words
 
 

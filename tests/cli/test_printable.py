@@ -47,8 +47,8 @@ from chauffeur.concept import (
     VehicleState,
     Verdict,
 )
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.recording import RecordedTrip
 from roads import a_road
 
 EVIL = (

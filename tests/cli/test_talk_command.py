@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from chauffeur.cli.main import app
 from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import HELP, read_line
-from chauffeur.drive.talk.messages import (
+from chauffeur.driving.talk.messages import (
     Answered,
     Conversation,
     Ended,

@@ -20,7 +20,7 @@ import pytest
 
 from chauffeur.cli import vehicle_desk
 from chauffeur.cli.vehicle_desk import Desk
-from chauffeur.drive.talk.asr_process import AsrEngine
+from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.safety.audit import read_records, verify
 
 ALSA = Path("/usr/share/alsa/alsa.conf")

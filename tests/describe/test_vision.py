@@ -14,7 +14,7 @@ from chauffeur.concept import CameraImage, Observation
 from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.road import own_direction
 from chauffeur.describe.vision import AGO_S, CameraDescriptor, SceneAnswers, describe_seen, rewound, seen
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.scenarios import find
 from chauffeur.worlds.highway import HighwayWorld
 
 

@@ -20,9 +20,9 @@ from chauffeur.concept import (
     ScenarioError,
     Trajectory,
 )
-from chauffeur.drive.conformance import check_executor
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import drive_policy
+from chauffeur.driving.conformance import check_executor
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import drive_policy
 from chauffeur.executors import executor_for
 from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.trajectory import rebased, reference_of

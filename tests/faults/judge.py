@@ -14,9 +14,9 @@ from itertools import pairwise
 from typing import Final
 
 from chauffeur.concept import Command, Frame, Limits, Observation
-from chauffeur.drive.actuate import actuate
-from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.starts import Start
+from chauffeur.driving.actuate import actuate
+from chauffeur.driving.live.messages import Report
+from chauffeur.driving.live.starts import Start
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD
 from chauffeur.worlds.highway import HighwayWorld

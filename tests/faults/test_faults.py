@@ -2,7 +2,7 @@
 
 The product knows nothing of it: bad programs, signals, a vandal in the shared memory, limits of the operating system, a
 clock that jumps. Endpoints that misbehave on the wire: `planners/test_llm_faults.py`; the death of the supervisor:
-`drive/test_live_runtime.py`.
+`driving/test_live_runtime.py`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ import pytest
 from judge import Heard, judge
 from vandal import DEEDS, FORGED, Vandal
 
-from chauffeur.drive.live.messages import MessageError, Report
-from chauffeur.drive.live.plan_messages import read_event
-from chauffeur.drive.live.ring import Reader
-from chauffeur.drive.live.settings import Settings, ring
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Role, Runtime
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.live.messages import MessageError, Report
+from chauffeur.driving.live.plan_messages import read_event
+from chauffeur.driving.live.ring import Reader
+from chauffeur.driving.live.settings import Settings, ring
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.live.supervisor import Role, Runtime
+from chauffeur.driving.scenarios import find
 
 sys.path.append(str(Path(__file__).parents[1] / "planners"))
 

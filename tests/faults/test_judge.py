@@ -9,10 +9,10 @@ import pytest
 from judge import Heard, judge
 
 from chauffeur.concept import Command, Setpoints
-from chauffeur.drive.actuate import actuate
-from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.actuate import actuate
+from chauffeur.driving.live.messages import Report
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.scenarios import find
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 

@@ -8,7 +8,7 @@ import struct
 
 import pytest
 
-from chauffeur.drive.live.ring import Reader, Ring
+from chauffeur.driving.live.ring import Reader, Ring
 
 HEAD_AT = 64
 

@@ -17,9 +17,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.drive.live.messages import MessageError, MirroredInstant
-from chauffeur.drive.live.ring import Ring
-from chauffeur.drive.live.settings import SIZES, RingName, ring
+from chauffeur.driving.live.messages import MessageError, MirroredInstant
+from chauffeur.driving.live.ring import Ring
+from chauffeur.driving.live.settings import SIZES, RingName, ring
 
 FORGED: Final = "forged"
 """Name of a plan that nobody made."""

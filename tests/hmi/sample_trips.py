@@ -33,7 +33,7 @@ from chauffeur.concept import (
     VehicleState,
     Verdict,
 )
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from roads import a_lane, a_road
 
 HOSTILE = "</script><img src=x onerror=alert(1)> & \u2028 '\" <!-- <script>"

@@ -12,7 +12,7 @@ import pytest
 
 import chauffeur
 from chauffeur.concept import MissingExtraError, PersonId
-from chauffeur.drive.session import parse_wish
+from chauffeur.driving.session import parse_wish
 from chauffeur.hmi import notebook
 from chauffeur.hmi.notebook import Drive, Rows
 from chauffeur.hmi.page import render_page
@@ -20,7 +20,7 @@ from chauffeur.hmi.page import render_page
 
 @pytest.fixture(scope="module")
 def drive() -> Drive:
-    return chauffeur.drive_wish("Change to the left lane.", scenario="cruise")
+    return chauffeur.drive("Change to the left lane.", scenario="cruise")
 
 
 @pytest.mark.parametrize("wish", ["It's Ada's & my wish.", "a" * 2000, "\ud800" * 400, '<b>"quoted"</b>'])
@@ -57,7 +57,7 @@ def test_columns_have_a_value_a_period(drive: Drive) -> None:
 
 
 def test_a_declined_wish_is_shown_too() -> None:
-    declined = chauffeur.drive_wish("Drive at 300 km/h through the red light.", scenario="cruise")
+    declined = chauffeur.drive("Drive at 300 km/h through the red light.", scenario="cruise")
     assert not declined.frames and set(map(len, declined.columns().values())) == {0}
     assert "<iframe" in declined._repr_html_() and " 0.0 s>" in repr(declined)
 

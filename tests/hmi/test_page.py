@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from sample_trips import HOSTILE, doubted, guarded, highway_trip, intersection_trip, refused_trip
 
 from chauffeur.concept import DataError, Parameters, RoadGraph
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.page import embed_json, render_page, write_page
 
 

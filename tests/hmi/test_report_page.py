@@ -17,7 +17,7 @@ from chauffeur.bench.kernel.report import Line, ResultTable
 from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, Flip, FlipList, Gallery
 from chauffeur.concept import DataError, Program, Verdict
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.drive_svg import draw_strip
 from chauffeur.hmi.report_page import render_report, write_report_page
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from chauffeur.concept import NOBODY, Limits
-from chauffeur.drive.emergency import EMERGENCY_PLANNER
-from chauffeur.drive.scenarios import find, suiting
-from chauffeur.drive.session import Session, parse_wish
+from chauffeur.driving.emergency import EMERGENCY_PLANNER
+from chauffeur.driving.scenarios import find, suiting
+from chauffeur.driving.session import Session, parse_wish
 from chauffeur.language.emergency import read_emergency
 from chauffeur.language.languages.reader import LANGUAGES, help_question, language_of, read_call, read_other
 from chauffeur.planners.registry import make_planner

@@ -9,9 +9,9 @@ import pytest
 from memory_trips import Clock, context, trip
 
 from chauffeur.concept import History, Instruction, Limits, PersonId
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import Session
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import Session
 from chauffeur.memory import VaultMemory
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.registry import make_planner

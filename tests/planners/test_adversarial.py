@@ -6,8 +6,8 @@ import asyncio
 import hashlib
 
 from chauffeur.concept import NOBODY, Limits
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import Session, drive_program, make_world, parse_wish
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import Session, drive_program, make_world, parse_wish
 from chauffeur.planners.adversarial import harmful
 from chauffeur.planners.registry import make_planner
 from chauffeur.programs import check_source

@@ -26,7 +26,7 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.concept.weather import Weather
-from chauffeur.drive.seat import SeatCamera
+from chauffeur.driving.seat import SeatCamera
 from chauffeur.planners.base import Planner
 from chauffeur.planners.camera_faults import picture_fault
 from chauffeur.planners.motion import MotionPlanner

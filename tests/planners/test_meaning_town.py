@@ -12,8 +12,8 @@ pytest.importorskip("libsumo")
 
 from chauffeur.concept import Instruction, Limits, PlanRequest
 from chauffeur.concept.utterance import Act, Condition, ConditionKind, Event, Reference, Utterance, Verb
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.session import Session
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.session import Session
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.meaning.compose import compose
 from chauffeur.programs.gate import check_source

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.concept import ConfigError, DataError
-from chauffeur.drive.conformance import check_planner
+from chauffeur.driving.conformance import check_planner
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 

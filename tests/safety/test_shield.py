@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Command, Lane, LaneId, Limits, Observation, Scenario, Setpoints, VehicleState
-from chauffeur.drive.episode import Episode, run_episode
+from chauffeur.driving.episode import Episode, run_episode
 from chauffeur.executors.base import HeldSetpoints
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD, FilterResult, Shield

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Command, Scenario
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.safety.shield import FilterResult, GroundShield, shield_for
 from chauffeur.worlds.parking import ParkingWorld, overlap
 

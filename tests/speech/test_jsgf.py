@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chauffeur.concept import DataError
-from chauffeur.drive.scenarios import BUILT_IN, suiting
+from chauffeur.driving.scenarios import BUILT_IN, suiting
 from chauffeur.language.tokens import tokens_of
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.speech.grammar import SAFE_INTENTS

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Setpoints
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.worlds.base import EGO, MirroredWorld
 from chauffeur.worlds.parking import ParkingWorld
 

@@ -8,7 +8,7 @@ import pytest
 
 from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Setpoints
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.parking import BUILT_IN, ParkingWorld, overlap
 from chauffeur.worlds.parking.actors import LotWalker

@@ -8,9 +8,9 @@ from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.signals import SignalLog
 from chauffeur.concept import Metric, Plan, Scenario
-from chauffeur.drive.episode import Referee
-from chauffeur.drive.judge.choice import acts_referee, free_referee
-from chauffeur.drive.judge.referee import ActsReferee
+from chauffeur.driving.episode import Referee
+from chauffeur.driving.judge.choice import acts_referee, free_referee
+from chauffeur.driving.judge.referee import ActsReferee
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway import HighwayWorld
 

@@ -11,7 +11,7 @@ from typing import Any
 from chauffeur.bench.kernel.engine import LocalEngine, Work
 from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ConfigError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 
 def claim(folder: Path, wanted: Mapping[str, Any], name: str = "config.json", indent: int | None = None) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.concept import Scenario
-    from chauffeur.drive.session_recorder import DriveRecorder
+    from chauffeur.driving.session_recorder import DriveRecorder
     from chauffeur.safety.audit import AuditVerification, Closing
 
 KEY_VARIABLE: Final = "CHAUFFEUR_AUDIT_KEY"
@@ -110,7 +110,7 @@ def auditor_for(path: Path, scenario: Scenario, seed: int) -> DriveRecorder:
     import os
 
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.session_recorder import open_audit
+    from chauffeur.driving.session_recorder import open_audit
 
     private = os.environ.get(PRIVATE_VARIABLE, "")
     if private not in ("", "0", "1"):

@@ -61,7 +61,7 @@ def planner(
     It is asked some twenty times. Exit code 1 where a check finds something.
     """
     from chauffeur.cli.bench_run import planner_options
-    from chauffeur.drive.conformance import check_planner
+    from chauffeur.driving.conformance import check_planner
     from chauffeur.planners.registry import make_planner, planner_from
 
     options = planner_options(name, base_url)
@@ -84,7 +84,7 @@ def executor(
     Exit code 1 where a check finds something.
     """
     from chauffeur.concept.registry import made
-    from chauffeur.drive.conformance import check_executor
+    from chauffeur.driving.conformance import check_executor
 
     tried = _named(policy)
     tried = made("policy", policy, tried) if isinstance(tried, type) or not hasattr(tried, "kind") else tried
@@ -205,7 +205,7 @@ def _scenario(name: str, scenario: str, config: str, seed: int) -> Any:
     from dataclasses import replace
 
     from chauffeur.concept import ConfigError, Scenario
-    from chauffeur.drive.scenarios import BUILT_IN
+    from chauffeur.driving.scenarios import BUILT_IN
 
     built_in = {one.id: one for one in BUILT_IN}
     if scenario:

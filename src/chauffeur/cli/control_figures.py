@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from chauffeur.cli.labels import FALLBACK_LEVELS
-from chauffeur.drive.talk.tally import Tally
+from chauffeur.driving.talk.tally import Tally
 from chauffeur.hmi import words
 
 _SCHEDULING: Final = {

@@ -11,7 +11,7 @@ from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile
 
 if TYPE_CHECKING:
-    from chauffeur.drive.recording import RecordedTrip
+    from chauffeur.driving.recording import RecordedTrip
 
 EXAMPLES = help_text("drive")
 
@@ -93,10 +93,10 @@ def drive(
     )
     from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId, Result, result_of
-    from chauffeur.drive.events import told_to
-    from chauffeur.drive.scenarios import find, planner_for, suiting
-    from chauffeur.drive.session import Forgetful, Session, parse_wish
-    from chauffeur.drive.session_recorder import with_head
+    from chauffeur.driving.events import told_to
+    from chauffeur.driving.scenarios import find, planner_for, suiting
+    from chauffeur.driving.session import Forgetful, Session, parse_wish
+    from chauffeur.driving.session_recorder import with_head
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import personal_limits
     from chauffeur.planners.talk2drive.recent import fitting
@@ -165,7 +165,7 @@ def asking() -> bool:
 
 def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:
     """Write recording, page, the view from the seat where the planner looked, and the filmstrip of what was driven."""
-    from chauffeur.drive.recording import write_trip
+    from chauffeur.driving.recording import write_trip
     from chauffeur.hmi.page import write_page
 
     written = [
@@ -180,7 +180,7 @@ def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:
         write_page(folder / "trip.html", recorded),
     ]
     if recorded.view is not None:
-        from chauffeur.drive.files import publish
+        from chauffeur.driving.files import publish
 
         written.append(publish(folder / "view.png", recorded.view.png(), "view from the seat"))
     if recorded.frames:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from chauffeur.drive.live.messages import FallbackLevel
+    from chauffeur.driving.live.messages import FallbackLevel
 
 FALLBACK_LEVELS: Final[dict[FallbackLevel, str]] = {
     "follow": "follows the plan",

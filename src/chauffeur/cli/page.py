@@ -21,7 +21,7 @@ def page(
 ) -> None:
     """Render a recorded trip as one self-contained HTML page."""
     from chauffeur.cli.console import columns, path_text, stdout
-    from chauffeur.drive.recording import read_trip
+    from chauffeur.driving.recording import read_trip
     from chauffeur.hmi.page import write_page
 
     trip = read_trip(recording)

@@ -11,7 +11,7 @@ from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtra
 if TYPE_CHECKING:
     from chauffeur.concept import Context, Observation
     from chauffeur.describe.services.sources import SourceSettings
-    from chauffeur.drive.talk.asr_process import AsrEngine
+    from chauffeur.driving.talk.asr_process import AsrEngine
     from chauffeur.planners.base import Planner
     from chauffeur.planners.prompts import Setting
 
@@ -102,7 +102,7 @@ def engine_named(spec: str) -> AsrEngine | None:
     Raises:
         ConfigError: There is no such engine.
     """
-    from chauffeur.drive.talk.asr_process import AsrEngine
+    from chauffeur.driving.talk.asr_process import AsrEngine
     from chauffeur.speech.engines import ENGINES
 
     name, _, model = spec.strip().partition("/")
@@ -126,7 +126,7 @@ def standing_sources() -> SourceSettings | None:
     Raises:
         ConfigError: The file cannot be used.
     """
-    from chauffeur.drive.surroundings import services_file
+    from chauffeur.driving.surroundings import services_file
 
     path = services_file()
     if path is None:

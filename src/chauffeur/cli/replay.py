@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.drive.recording import RecordedTrip
+    from chauffeur.driving.recording import RecordedTrip
 
 EXAMPLES = """
 Examples:
@@ -32,8 +32,8 @@ def replay(
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import limits_named
-    from chauffeur.drive.again import drive_again
-    from chauffeur.drive.recording import compare_trips, read_trip
+    from chauffeur.driving.again import drive_again
+    from chauffeur.driving.recording import compare_trips, read_trip
     from chauffeur.memory.personal_limits import personal_limits
 
     console = stdout()
@@ -68,7 +68,7 @@ def other_versions(recorded: RecordedTrip) -> list[str]:
     """What has changed on this machine since the recording, as far as it could matter."""
     import platform
 
-    from chauffeur.drive.session import make_world
+    from chauffeur.driving.session import make_world
     from chauffeur.version import __version__
 
     changed: list[str] = []

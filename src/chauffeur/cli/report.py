@@ -50,7 +50,7 @@ def report(
     from chauffeur.cli.console import columns, path_text, plain, stdout
     from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.files import publish
+    from chauffeur.driving.files import publish
     from chauffeur.hmi.report_page import write_report_page
 
     if inspect is not None and len(runs) != 1:

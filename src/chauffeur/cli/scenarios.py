@@ -24,7 +24,7 @@ def scenarios(
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import ScenarioError
-    from chauffeur.drive.scenarios import BUILT_IN, DATA_VARIABLE, list_scenarios
+    from chauffeur.driving.scenarios import BUILT_IN, DATA_VARIABLE, list_scenarios
 
     console = stdout()
     wanted = find.casefold()

@@ -153,7 +153,7 @@ def check(
     from chauffeur.bench.lampilot.scenes.scene_check import check as look_over
     from chauffeur.bench.lampilot.scenes.scene_check import counts
     from chauffeur.cli.console import plain, stdout
-    from chauffeur.drive.files import publish
+    from chauffeur.driving.files import publish
 
     console = stdout()
     with progress(console, "checked") as show:

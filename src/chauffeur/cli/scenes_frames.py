@@ -25,7 +25,7 @@ def sft(
     from chauffeur.bench.openloop import OpenLoopBenchmark
     from chauffeur.bench.openloop.requests import training_lines
     from chauffeur.cli.console import stdout
-    from chauffeur.drive.files import publish
+    from chauffeur.driving.files import publish
 
     bench = OpenLoopBenchmark(str(data), tables, "sft", scene_list=str(scene_list or ""), stride=stride)
     lines = [*training_lines((one for one in bench.samples if one.whole), data)]

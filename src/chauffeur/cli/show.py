@@ -35,8 +35,8 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.concept.units import SpeedUnit, people_speed
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.conflicts import conflicts_in

@@ -86,15 +86,15 @@ def talk(
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
-    from chauffeur.drive.live.recorder import LiveRecorder, unanswered
-    from chauffeur.drive.live.settings import Settings
-    from chauffeur.drive.live.starts import Start
-    from chauffeur.drive.scenarios import find, lasting, planner_for, seeds_with_lead, suiting
-    from chauffeur.drive.session import make_world, parse_wish
-    from chauffeur.drive.surroundings import services_file
-    from chauffeur.drive.talk.session import WELL, Talk
-    from chauffeur.drive.talk.sound import Sound
-    from chauffeur.drive.talk.voice import Voice
+    from chauffeur.driving.live.recorder import LiveRecorder, unanswered
+    from chauffeur.driving.live.settings import Settings
+    from chauffeur.driving.live.starts import Start
+    from chauffeur.driving.scenarios import find, lasting, planner_for, seeds_with_lead, suiting
+    from chauffeur.driving.session import make_world, parse_wish
+    from chauffeur.driving.surroundings import services_file
+    from chauffeur.driving.talk.session import WELL, Talk
+    from chauffeur.driving.talk.sound import Sound
+    from chauffeur.driving.talk.voice import Voice
     from chauffeur.memory.choice import chosen_memory, open_memory
     from chauffeur.memory.personal_limits import personal_limits
 

@@ -11,9 +11,9 @@ from chauffeur.cli.interrupts import Interrupts
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import read_line
-from chauffeur.drive.live.plan_messages import TOOK_OVER
-from chauffeur.drive.talk.messages import Conversation, Said, Say, Stop
-from chauffeur.drive.talk.session import Talk
+from chauffeur.driving.live.plan_messages import TOOK_OVER
+from chauffeur.driving.talk.messages import Conversation, Said, Say, Stop
+from chauffeur.driving.talk.session import Talk
 from chauffeur.language.emergency import read_emergency
 from chauffeur.language.questions import ends_session
 

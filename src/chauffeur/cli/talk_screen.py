@@ -20,7 +20,7 @@ from chauffeur.cli.labels import FALLBACK_LEVELS, NOT_HEARD
 from chauffeur.cli.talk_typed import HELP
 from chauffeur.concept import HELPERS_HEAD, Result
 from chauffeur.concept.units import people_speed
-from chauffeur.drive.talk.messages import (
+from chauffeur.driving.talk.messages import (
     Answered,
     Conversation,
     Ended,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from chauffeur.drive.talk.messages import Evaluate, Hand, MemoryOrder, Say, TakeOver, Told
+from chauffeur.driving.talk.messages import Evaluate, Hand, MemoryOrder, Say, TakeOver, Told
 
 HELP: Final = (
     ("any words", "a wish, e.g. slow down a bit"),

@@ -10,13 +10,13 @@ from typing import Final
 
 from chauffeur.cli.lines import Lines, standard_input
 from chauffeur.cli.vehicle_screen import VehicleScreen
-from chauffeur.drive.onroad import VehicleSession
-from chauffeur.drive.onroad.spoken import listening
-from chauffeur.drive.talk.asr_process import AsrEngine
-from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.sound import Sound
-from chauffeur.drive.talk.voice import Voice
-from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.spoken import listening
+from chauffeur.driving.talk.asr_process import AsrEngine
+from chauffeur.driving.talk.attention import Attention
+from chauffeur.driving.talk.sound import Sound
+from chauffeur.driving.talk.voice import Voice
+from chauffeur.driving.talk.wish_queue import Words
 from chauffeur.language.meaning.turns import answer_in
 from chauffeur.language.questions import ends_session
 

@@ -12,7 +12,7 @@ from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
 
 if TYPE_CHECKING:
-    from chauffeur.drive.onroad import VehicleRecorder
+    from chauffeur.driving.onroad import VehicleRecorder
     from chauffeur.worlds.ros.settings import VehicleSettings
 
 DRIVE_EXAMPLES: Final = help_text("vehicle_drive DRIVE_EXAMPLES")
@@ -57,10 +57,10 @@ def drive(
     from chauffeur.cli.vehicle_screen import VehicleScreen
     from chauffeur.concept import PersonId
     from chauffeur.describe.services.sources import read_sources
-    from chauffeur.drive.onroad import VehicleSession
-    from chauffeur.drive.surroundings import opened
-    from chauffeur.drive.talk.sound import Sound
-    from chauffeur.drive.talk.voice import Voice
+    from chauffeur.driving.onroad import VehicleSession
+    from chauffeur.driving.surroundings import opened
+    from chauffeur.driving.talk.sound import Sound
+    from chauffeur.driving.talk.voice import Voice
     from chauffeur.memory.choice import open_memory
     from chauffeur.planners.talk2drive.recent import fitting
     from chauffeur.worlds.ros.factory import open_vehicle
@@ -128,7 +128,7 @@ def _books(path: Path, file: Path, settings: VehicleSettings, *, dry_run: bool) 
 
     from chauffeur.cli.audit import KEY_VARIABLE, PRIVATE_VARIABLE
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.onroad import open_recorder
+    from chauffeur.driving.onroad import open_recorder
 
     private = os.environ.get(PRIVATE_VARIABLE, "")
     if private not in ("", "0", "1"):

@@ -9,11 +9,11 @@ from rich.text import Text
 
 from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
-from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoadAnswer
-from chauffeur.drive.talk.messages import HeardWords, Note, Said
-from chauffeur.drive.talk.voice import Voice
-from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.driving.events import DriveEvent
+from chauffeur.driving.onroad import OnRoadAnswer
+from chauffeur.driving.talk.messages import HeardWords, Note, Said
+from chauffeur.driving.talk.voice import Voice
+from chauffeur.driving.talk.wish_queue import Words
 from chauffeur.worlds.ros import Published
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
 from chauffeur.worlds.ros.lines import command_line

@@ -13,7 +13,7 @@ class ChauffeurError(Exception):
         retryable: Whether the same call may succeed later without a change.
 
     >>> try:
-    ...     chauffeur.drive_wish("Overtake.", scenario="moon")
+    ...     chauffeur.drive("Overtake.", scenario="moon")
     ... except chauffeur.ChauffeurError as error:
     ...     print(error.message)
     Unknown scenario 'moon'.

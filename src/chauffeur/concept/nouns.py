@@ -420,7 +420,7 @@ class PlanRequest:
     ...     async def plan(self, request: chauffeur.PlanRequest) -> chauffeur.Plan:
     ...         words = f"I do not know what {request.instruction.text!r} means."
     ...         return chauffeur.Plan(chauffeur.Thoughts(words), None, refusal=words, planner=self.id, model=self.model)
-    >>> chauffeur.drive_wish("Go.", planner=Deaf(), scenario="cruise").trip.plan.refusal
+    >>> chauffeur.drive("Go.", planner=Deaf(), scenario="cruise").trip.plan.refusal
     "I do not know what 'Go.' means."
     """
 

@@ -25,7 +25,7 @@ class Scenario:
 
     >>> config = {"type": "dt-highway-v0", "num_lanes": 3, "vehicles_count": 8}
     >>> quiet = chauffeur.Scenario("quiet", "highway", config, seed=3)
-    >>> chauffeur.drive_wish("Keep going.", scenario=quiet).trip.scenario
+    >>> chauffeur.drive("Keep going.", scenario=quiet).trip.scenario
     'quiet'
     """
 

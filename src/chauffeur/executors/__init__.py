@@ -1,4 +1,4 @@
-"""Executors: one module a policy kind. They turn a checked policy into commands; `drive.actuate` hands those on.
+"""Executors: one module a policy kind. They turn a checked policy into commands; `driving.actuate` hands those on.
 
 That of programs is not named here: a control process drives none, and loads nothing of their language.
 """

@@ -3,7 +3,7 @@
 The same parameters drive on a highway, over an intersection and in a parking lot. The vehicle follows a path with pure
 pursuit; what the path is depends on the road: the middle of its lane, that of the wished lane once there is a gap, the
 way through the crossing, or the way onto a spot. It stops at stop signs, lets go first who crosses, and stands at the
-end of its path. The shield has the last word, and the command passes the one door (`drive/actuate.py`).
+end of its path. The shield has the last word, and the command passes the one door (`driving/actuate.py`).
 
 The policy's `route` says where to go where ways part: a turn (`left`, `straight`, `right`), or a place in a lot
 (`nearest`, `stadium`, `exit`, or the name of a spot).

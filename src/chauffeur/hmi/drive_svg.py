@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from chauffeur.concept import Observation, VehicleState
 from chauffeur.concept.units import kmh, people_speed
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.filmstrip import choose_moments
 from chauffeur.hmi.road import Bounds, PaintedRoad, draw_road, track_box

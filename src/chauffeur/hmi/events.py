@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Literal
 
 from chauffeur.concept import Frame, Observation
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.interventions import ShieldedStretch, stretches_of
 from chauffeur.hmi.view import instants_of

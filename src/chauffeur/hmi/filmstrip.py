@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 from chauffeur.concept import DataError, Observation, VehicleState
 from chauffeur.concept.paint import css_colour
 from chauffeur.concept.units import people_speed
-from chauffeur.drive.files import publish
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.files import publish
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import EventKind, TripMark, events_of
 from chauffeur.hmi.interventions import stretches_of

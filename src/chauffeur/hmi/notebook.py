@@ -12,7 +12,7 @@ import numpy as np
 
 from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import Frame, MissingExtraError, result_of
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import printable
 from chauffeur.hmi.page import render_page
 
@@ -47,7 +47,7 @@ _COLUMNS: Final[dict[str, Callable[[Frame], Any]]] = {
 class Drive(RecordedTrip):
     """A drive that a notebook can show: the last line of a cell plays it.
 
-    >>> drive = chauffeur.drive_wish("Change to the left lane.", scenario="cruise")
+    >>> drive = chauffeur.drive("Change to the left lane.", scenario="cruise")
     >>> drive.trip.plan.intent, len(drive.columns()["speed_mps"]) == len(drive.frames)
     ('lane.left', True)
     """

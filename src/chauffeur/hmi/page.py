@@ -12,8 +12,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from chauffeur.drive.files import publish
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.files import publish
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.payload import page_payload
 

@@ -30,7 +30,7 @@ from chauffeur.concept import (
 from chauffeur.concept.paint import css_colour
 from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of

@@ -17,7 +17,7 @@ from chauffeur.bench.kernel.metrics import Measure
 from chauffeur.bench.kernel.report import Line, ResultTable, count_text, head, value_text
 from chauffeur.bench.kernel.stats import DRAWS, LEAST_CLUSTERS, Interval
 from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, FlipList, Gallery
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.drive_svg import SYMBOLS, draw_strip
 from chauffeur.hmi.payload import program_tokens

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 
 from chauffeur.concept import Lane, Observation, RoadGraph, Signal, VehicleState
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, track_box
 

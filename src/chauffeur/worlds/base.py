@@ -172,7 +172,7 @@ class World(Protocol):
         ...
 
     def step(self, command: Command) -> Command:
-        """Advance one control period; returns the command really applied. Only `drive.actuate` calls it."""
+        """Advance one control period; returns the command really applied. Only `driving.actuate` calls it."""
         ...
 
     def observe(self) -> Observation:

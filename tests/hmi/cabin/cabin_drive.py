@@ -8,12 +8,12 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
-from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.starts import Start
-from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.asr_process import AsrEngine
-from chauffeur.drive.talk.messages import Said, Told
-from chauffeur.drive.talk.session import Talk
+from chauffeur.driving.live.settings import Settings
+from chauffeur.driving.live.starts import Start
+from chauffeur.driving.scenarios import find
+from chauffeur.driving.talk.asr_process import AsrEngine
+from chauffeur.driving.talk.messages import Said, Told
+from chauffeur.driving.talk.session import Talk
 from chauffeur.hmi.cabin import Cabin
 
 PATIENCE_S = 240.0

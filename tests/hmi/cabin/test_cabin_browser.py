@@ -12,7 +12,7 @@ from cabin_desk import SAID, SAID_MPS, Desk
 from cabin_drive import Drive, driving
 from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
-from chauffeur.drive.talk.messages import (
+from chauffeur.driving.talk.messages import (
     Button,
     Confirm,
     Conversation,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chauffeur.drive.talk.messages import Road, RoadLane
+from chauffeur.driving.talk.messages import Road, RoadLane
 from chauffeur.hmi.cabin.board import drawn
 
 

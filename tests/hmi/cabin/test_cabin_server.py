@@ -21,7 +21,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from chauffeur.concept import ConfigError
-from chauffeur.drive.talk.messages import (
+from chauffeur.driving.talk.messages import (
     Answered,
     Button,
     Conversation,

@@ -82,7 +82,7 @@ def test_a_folder_without_a_checkpoint_is_refused(examples: ChatExamples, tmp_pa
 
 def _request() -> PlanRequest:
     from chauffeur.describe.track import describe_track
-    from chauffeur.drive.seat import SeatCamera
+    from chauffeur.driving.seat import SeatCamera
     from chauffeur.worlds.track import TrackWorld, track_scenario
 
     world = TrackWorld()

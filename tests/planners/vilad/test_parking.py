@@ -24,7 +24,7 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.describe.dispatch import describe
-from chauffeur.drive.scenarios import find
+from chauffeur.driving.scenarios import find
 from chauffeur.planners.vilad import ViladPlanner
 from chauffeur.planners.vilad.engine import ViladEngine, shipped
 from chauffeur.planners.vilad.parking import (

@@ -22,7 +22,7 @@ from chauffeur.concept import (
     Program,
     SystemMessage,
 )
-from chauffeur.drive.planning import RECALLED, screened_request
+from chauffeur.driving.planning import RECALLED, screened_request
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.constant_calls import read_program
 

@@ -30,8 +30,8 @@ from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.stages import Manifest, StageStore, take_over_shards
 from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
-from chauffeur.drive import event_loop
-from chauffeur.drive.files import publish
+from chauffeur.driving import event_loop
+from chauffeur.driving.files import publish
 from chauffeur.planners.base import Answerer, Planner
 from chauffeur.version import __version__
 

@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from chauffeur.concept import ChauffeurError, ConfigError, DataError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 Row = dict[str, Any]
 

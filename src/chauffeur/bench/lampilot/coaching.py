@@ -42,9 +42,9 @@ from chauffeur.concept import (
     Usage,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.planning import checked, screened_request
-from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.session import drive_program, make_trip, make_world, scenario_hash
+from chauffeur.driving.planning import checked, screened_request
+from chauffeur.driving.recording import RecordedTrip
+from chauffeur.driving.session import drive_program, make_trip, make_world, scenario_hash
 from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
 from chauffeur.memory.policies_entry import Describer, Judge, PolicyEntry, content_id, fitting_name
 from chauffeur.planners.base import Planner, Writer

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 from chauffeur.bench.lampilot.seen import STANDING_MPS, SeenCommands, watch
-from chauffeur.drive.planning import declined
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.planning import declined
+from chauffeur.driving.recording import RecordedTrip
 from chauffeur.memory.policies_entry import Judge
 from chauffeur.worlds.highway.dblv1 import Item
 

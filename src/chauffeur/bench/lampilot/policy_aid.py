@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import ConfigError, Context, Instruction, Limits, PlanRequest, SystemMessage
-from chauffeur.drive.planning import screened_request
+from chauffeur.driving.planning import screened_request
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.memory.policies_entry import PolicyEntry
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, Helper, build_coached_message

@@ -21,7 +21,7 @@ from chauffeur.bench.lampilot.metrics import (
 )
 from chauffeur.bench.lampilot.referee import GoalJudge
 from chauffeur.concept import Scenario
-from chauffeur.drive.rehearsal import RehearsedChoice, rehearse
+from chauffeur.driving.rehearsal import RehearsedChoice, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception

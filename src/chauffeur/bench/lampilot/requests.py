@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 from chauffeur.concept import Context, Instruction, Limits, PlanRequest, SystemMessage
-from chauffeur.drive.planning import screened_request
+from chauffeur.driving.planning import screened_request
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.worlds.highway.dblv1 import Item
 

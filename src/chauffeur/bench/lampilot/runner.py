@@ -16,7 +16,7 @@ from chauffeur.bench.lampilot.results import publish_results, results
 from chauffeur.bench.lampilot.rollout import BASELINES
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.concept import ConfigError
-from chauffeur.drive.rehearsal import label
+from chauffeur.driving.rehearsal import label
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting
 from chauffeur.safety.shield import SHIELD_VERSION

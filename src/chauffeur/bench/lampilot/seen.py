@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Literal
 
 from chauffeur.concept import LaneId, Observation, VehicleState
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 
 STANDING_MPS = 0.5
 _BESIDE_M = 2.5

@@ -34,8 +34,8 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.session import make_trip
+from chauffeur.driving.recording import RecordedTrip
+from chauffeur.driving.session import make_trip
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset

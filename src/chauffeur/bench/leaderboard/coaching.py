@@ -30,7 +30,7 @@ from chauffeur.concept import (
     Round,
     Thoughts,
 )
-from chauffeur.drive.planning import screened_request
+from chauffeur.driving.planning import screened_request
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.base import Planner
 

@@ -36,9 +36,9 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe
 from chauffeur.describe.navigation import NOW_M, NavigationInstruction, Navigator
-from chauffeur.drive.actuate import set_points
-from chauffeur.drive.fallback import keep_lane_and_gap
-from chauffeur.drive.planning import checked, screened_request
+from chauffeur.driving.actuate import set_points
+from chauffeur.driving.fallback import keep_lane_and_gap
+from chauffeur.driving.planning import checked, screened_request
 from chauffeur.geometry import Route
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.base import Planner

@@ -20,8 +20,8 @@ from chauffeur.bench.leaderboard.ways import PlannedRoute, plan_official, track_
 from chauffeur.concept import ChauffeurError, Context, Limits, Observation, Plan, PlannerError, PlanRequest, Scenario
 from chauffeur.describe import describe
 from chauffeur.describe.navigation import NavigationInstruction
-from chauffeur.drive.actuate import actuate
-from chauffeur.drive.planning import checked
+from chauffeur.driving.actuate import actuate
+from chauffeur.driving.planning import checked
 from chauffeur.geometry import LaneId, RoadGraph, Route, named_ways
 from chauffeur.safety.checks import DRIVE_CHECKS
 from chauffeur.safety.shield import shield_for

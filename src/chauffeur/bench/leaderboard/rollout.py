@@ -15,7 +15,7 @@ from chauffeur.bench.leaderboard.staging import ScenarioWorld
 from chauffeur.bench.leaderboard.triggers import Trigger, place
 from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError, MissingExtraError, Scenario
-from chauffeur.drive.actuate import actuate
+from chauffeur.driving.actuate import actuate
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld
 from chauffeur.worlds.town.library import load

@@ -13,7 +13,7 @@ from chauffeur.bench.motion.driving import MotionJob, job_key
 from chauffeur.bench.motion.items import MotionItem, Shown, Told, data_sha256, motion_items, style_ranges
 from chauffeur.bench.motion.scoring import SCORE_VERSION, WEIGHTS, MotionStatistics, command_alignment, driving_score
 from chauffeur.concept import ActionMatrix, ConfigError, Instruction, PlanRequest, SystemMessage
-from chauffeur.drive.planning import screened_request
+from chauffeur.driving.planning import screened_request
 from chauffeur.safety.gain_box import care, gain_box
 from chauffeur.worlds.track import FRICTION, MANOEUVRES
 from chauffeur.worlds.track.dynamics import PLANTS, Plant

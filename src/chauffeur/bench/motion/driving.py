@@ -12,8 +12,8 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.rollout import plan_adapter
 from chauffeur.bench.motion.scoring import SCORE_VERSION, measured
 from chauffeur.concept import ActionMatrix, ChauffeurError, Limits, Plan, Scenario
-from chauffeur.drive.planning import checked
-from chauffeur.drive.session import drive_policy, scenario_hash
+from chauffeur.driving.planning import checked
+from chauffeur.driving.session import drive_policy, scenario_hash
 from chauffeur.planners.prompts.motion import MODERATE
 from chauffeur.worlds.track import TrackWorld
 

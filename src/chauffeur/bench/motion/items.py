@@ -14,8 +14,8 @@ import numpy as np
 from chauffeur.concept import CameraImage, Context, DataError, Scenario
 from chauffeur.concept.data import read_data
 from chauffeur.concept.weather import WEATHERS, Weather
-from chauffeur.drive.seat import SeatCamera
-from chauffeur.drive.surroundings import SKY
+from chauffeur.driving.seat import SeatCamera
+from chauffeur.driving.surroundings import SKY
 from chauffeur.planners.vlm.template import STYLES, Style
 from chauffeur.worlds.track import TrackWorld, track_scenario
 from chauffeur.worlds.track.dynamics import Plant

@@ -46,9 +46,9 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.weather import WEATHERS
 from chauffeur.describe.track import describe_track
-from chauffeur.drive.episode import Episode
-from chauffeur.drive.loop import LoopMemory, Stages, drive
-from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip
+from chauffeur.driving.episode import Episode
+from chauffeur.driving.loop import LoopMemory, Stages, drive
+from chauffeur.driving.session import Forgetful, check_drive, declined, drive_policy, make_trip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting

@@ -28,7 +28,7 @@ from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_f
 from chauffeur.bench.sets import claim
 from chauffeur.camera import Camera, Conditions, Rig
 from chauffeur.concept import ConfigError, ScenarioError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.geometry import Pose
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chauffeur.bench.openloop.nuscenes import CAMERA, MARKS, STEP_S, OpenLoopMark
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 if TYPE_CHECKING:
     from chauffeur.camera import Camera

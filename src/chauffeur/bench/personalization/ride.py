@@ -34,9 +34,9 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.episode import Episode, Referee
-from chauffeur.drive.loop import LoopMemory, Stages, drive
-from chauffeur.drive.session import check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.driving.episode import Episode, Referee
+from chauffeur.driving.loop import LoopMemory, Stages, drive
+from chauffeur.driving.session import check_drive, declined, drive_policy, make_trip, make_world
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.privacy import Privacy
 from chauffeur.memory.vault import VaultMemory

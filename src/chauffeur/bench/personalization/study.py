@@ -40,7 +40,7 @@ from chauffeur.bench.personalization.takeover import (
 )
 from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace, limit_of
 from chauffeur.concept import NOBODY, Limits, Parameters, Scenario
-from chauffeur.drive.session import Forgetful, make_world
+from chauffeur.driving.session import Forgetful, make_world
 from chauffeur.planners.talk2drive.recent import RecentToo
 
 BENCH_VERSION: Final = "personalization-v3"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chauffeur.bench.personalization.scoring import TripStatistics, statistics_of
 from chauffeur.concept import Frame, Observation, VehicleState
-from chauffeur.drive.episode import Episode
+from chauffeur.driving.episode import Episode
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

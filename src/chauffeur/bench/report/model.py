@@ -8,7 +8,7 @@ from typing import Any
 
 from chauffeur.bench.kernel.report import ResultTable
 from chauffeur.concept import Program, Verdict
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.driving.recording import RecordedTrip
 
 SIMULATED = "simulated drives"
 """Said wherever a result of drives stands."""

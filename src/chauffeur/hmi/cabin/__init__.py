@@ -2,7 +2,7 @@
 
 with Cabin() as cabin:
     print(cabin.url)
-    cabin.tell(message)  # anything of drive.talk.messages.Said, from any thread; never waits
+    cabin.tell(message)  # anything of driving.talk.messages.Said, from any thread; never waits
     told = cabin.take(0.05)  # Told, or sound as bytes, or None
 """
 

@@ -8,7 +8,7 @@ from collections.abc import AsyncGenerator, Mapping
 from typing import Any, Final
 
 from chauffeur.concept import Lane, RoadGraph
-from chauffeur.drive.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
+from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, draw_road
 

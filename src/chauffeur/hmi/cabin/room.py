@@ -12,8 +12,8 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, Literal
 
-from chauffeur.drive.live.messages import MessageError
-from chauffeur.drive.talk.messages import Button, Said, Stop, Told, read_told
+from chauffeur.driving.live.messages import MessageError
+from chauffeur.driving.talk.messages import Button, Said, Stop, Told, read_told
 from chauffeur.hmi.cabin.board import LatestMessages, Outbox
 
 if TYPE_CHECKING:

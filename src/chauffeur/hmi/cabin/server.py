@@ -11,7 +11,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Final
 
-from chauffeur.drive.talk.messages import Note, Said, Told
+from chauffeur.driving.talk.messages import Note, Said, Told
 from chauffeur.hmi.cabin.room import CabinRoom
 from chauffeur.hmi.local_page import HOST, Certificate, LocalPage, PageFile
 

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import ConfigError, DataError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.models.onboard.cases import Case
 from chauffeur.models.onboard.engine import (
     PER_CASE,

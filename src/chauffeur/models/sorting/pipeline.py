@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.models.sorting.sentences import Name, Sentence, kinds_of, sentences, table
 from chauffeur.models.sorting.tables import drawn

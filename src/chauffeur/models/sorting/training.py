@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.language.text_classifier import BITS, TextClassifier, hashed_features
 from chauffeur.models.sorting.sentences import Sentence
 

@@ -18,7 +18,7 @@ from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.openloop.conventions import CONVENTIONS, errors, fails
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.frames import SIMULATED
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.models.vilad.frames_baselines import STEPS, strangers_paths, train_status_mlp
 from chauffeur.models.vilad.frames_data import FrameSet, joined, load_frames
 from chauffeur.models.vilad.frames_recipe import FramesRecipe, train_frames

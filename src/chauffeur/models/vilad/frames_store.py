@@ -20,7 +20,7 @@ import torch
 
 from chauffeur.bench.openloop.extrapolation import constant_velocity
 from chauffeur.concept import DataError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.models.net.vision import VisionConfig
 from chauffeur.models.vilad.frames_baselines import expected_paths
 from chauffeur.models.vilad.frames_data import FrameSet, ego_features

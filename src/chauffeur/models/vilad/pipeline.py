@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.models.vilad.baseline import COMMANDS, linear_reader
 from chauffeur.models.vilad.evaluation import ViladCase, ViladFigures, figures, solved
 from chauffeur.models.vilad.phrases import TESTS, Split

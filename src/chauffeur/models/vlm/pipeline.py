@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.models.sorting.training import write
 from chauffeur.models.vlm.config import VlmRecipe
 from chauffeur.models.vlm.ear import HEAD_SHARE, NETWORK_SHARE, style_head, style_sorter, style_worth

@@ -39,7 +39,7 @@ class HighwayEnvironment(gymnasium.Env[FloatArray, FloatArray]):
 
         Args:
             scenario: A scenario, or the name of a built-in one.
-            render_mode: Only None; `chauffeur.drive_wish` shows a drive.
+            render_mode: Only None; `chauffeur.drive` shows a drive.
         """
         if isinstance(scenario, str):
             found = next((s for s in BUILT_IN if s.id == scenario), None)

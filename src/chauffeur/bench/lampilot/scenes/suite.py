@@ -25,7 +25,7 @@ from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, norm
 from chauffeur.bench.lampilot.scenes.writer import SceneItem, folder_of, items_of, write_folder
 from chauffeur.bench.sets import Progress, claim, spread
 from chauffeur.concept import ConfigError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 

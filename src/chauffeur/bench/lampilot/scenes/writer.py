@@ -16,7 +16,7 @@ from typing import Any
 from chauffeur.bench.lampilot.scenes.annotations import FILE, Annotation
 from chauffeur.bench.lampilot.scenes.wishes import UNITS
 from chauffeur.bench.lampilot.scenes.wording_choice import SceneChoice
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,7 @@ from chauffeur.bench.openloop.driving import UNSEEN_TOWN, Place
 from chauffeur.bench.sets import claim
 from chauffeur.camera import LOOKS, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
 from chauffeur.concept import ConfigError
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 if TYPE_CHECKING:
     from chauffeur.camera import Renderer

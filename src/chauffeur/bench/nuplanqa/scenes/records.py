@@ -13,7 +13,7 @@ from chauffeur.bench.nuplanqa.scenes.facts import Seen, facts_of
 from chauffeur.bench.nuplanqa.scenes.scene import SAMPLES, STEP_S, QaScene
 from chauffeur.camera import Camera, CameraImages, Rig
 from chauffeur.concept.scene import Observation
-from chauffeur.drive.files import publish
+from chauffeur.driving.files import publish
 
 LEAST_SHARE: Final = 0.35
 """Share of a road user that must be unhidden in the picture that shows it best."""
