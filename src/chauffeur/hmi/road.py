@@ -341,7 +341,8 @@ def _lines_of(
     places = {(lanes[i].road, lanes[i].index): lanes[i] for i in near if lanes[i].road}
     lines: list[PaintedLine] = []
     for side in (-1, 1):
-        edge = centre + _right_normal(centre) * (side * lane.width_m / 2.0)
+        outward = _right_normal(centre) * side
+        edge = centre + outward * (lane.width_m / 2.0)
         beside = places.get((lane.road, lane.index + side))
         if beside is not None:
             if side < 0 or crossed:
@@ -356,9 +357,12 @@ def _lines_of(
         for other in near:
             if other == index:
                 continue
-            distance, along = _distance(edge, slim[other])
             half = lanes[other].width_m / 2.0
-            shown &= distance > half + (_ON_EDGE_M if crossed else -_ON_EDGE_M)
+            if crossed:  # lanes that go on side by side hide each other's edge, and leave the one that they share
+                shown &= _distance(edge + outward * _ON_EDGE_M, slim[other])[0] > half
+                continue
+            distance, along = _distance(edge, slim[other])
+            shown &= distance > half - _ON_EDGE_M
             opposite = (along * _direction(centre)).sum(axis=1) < -0.9
             touching = opposite & (np.abs(distance - half) <= _ON_EDGE_M)
             centre_line |= touching
