@@ -18,9 +18,10 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from carla_driver_interface.driver import BaseDriver, CameraFrame, DriveContext, DriveResult, SessionState
 from carla_driver_interface.geometry import Pose as RigPose
 from carla_driver_interface.geometry import Trajectory as RigTrajectory
@@ -46,17 +47,19 @@ from chauffeur.describe import describe_with_traffic
 from chauffeur.driving import event_loop
 from chauffeur.driving.emergency import not_checked, planned_for
 from chauffeur.driving.episode import run_episode
+from chauffeur.driving.fallback import keep_lane_and_gap
 from chauffeur.driving.planning import PLAN_WITHIN_S, Judged, Planned, PlanSteps, plan_once
 from chauffeur.driving.session import check_drive
 from chauffeur.executors import Executor, executor_for
 from chauffeur.executors.base import HeldSetpoints
-from chauffeur.driving.fallback import keep_lane_and_gap
+from chauffeur.foreign.waypoints import FUTURE, STEP_S
 from chauffeur.geometry import Polyline, Pose
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import build_system_message
+from chauffeur.planners.prompts.waypoints import HISTORY, motion_words
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.shield import shield_for
-from chauffeur.worlds.route import CAR, DT_S, RouteWorld
+from chauffeur.worlds.route import CAR, DT_S, LANE, RouteWorld
 
 if TYPE_CHECKING:
     from carla_driver_interface.protocol import CarlaActorState, CarlaRendererData
@@ -76,6 +79,10 @@ _STOPPING: Final = (TrafficLightState.TRAFFIC_LIGHT_STATE_RED, TrafficLightState
 _STOP_LINE_M: Final = 0.5
 """Length of the obstacle that stands for a light."""
 _STANDS_MPS: Final = 0.3
+_LEAST_MPS: Final = 5.0
+"""A car that stands looks so far ahead for its next turn as one this fast."""
+_ASIDE_M: Final = 2.0
+"""ST-P3's and UniAD's command: left or right where the car is so far aside after 3 s."""
 _MOST_WAYPOINTS: Final = 1_500
 _MOST_AGENTS: Final = 400
 _KINDS: Final[Mapping[str, str]] = {"walker": "pedestrian"}
@@ -127,7 +134,7 @@ class EgoDriver(BaseDriver):
     def __init__(
         self, planner: Planner, wish: str = WISH, *, limit_mps: float = 13.9, limits: Limits | None = None
     ) -> None:
-        """Args: who plans; the passenger's words; speed limit where none is told, m/s; limits of person and operator."""
+        """Args: who plans; the passenger's words; speed limit where none is told, m/s; limits of the person."""
         self.name = f"chauffeur-{planner.id}"
         self._planner, self._wish, self._limit_mps = planner, Instruction(wish), limit_mps
         self._limits = Limits() if limits is None else limits
@@ -165,7 +172,7 @@ class EgoDriver(BaseDriver):
     def _plan(self, rollout: _Rollout, now: Observation, ctx: DriveContext) -> float:
         rollout.at_us = ctx.time_now_us
         try:
-            planned = event_loop.run(plan_once(self._wish, self._steps(now, _pictures(ctx))))
+            planned = event_loop.run(plan_once(self._wish, self._steps(now, motion_of(ctx, now), _pictures(ctx))))
         except ChauffeurError as error:
             _log.warning("%s: no plan: %s", self.name, error)
             if rollout.planned is None:
@@ -178,9 +185,10 @@ class EgoDriver(BaseDriver):
             rollout.planned, rollout.origin, rollout.ticked_us = planned, now.ego, ctx.time_now_us
         return planned.plan.latency_s
 
-    def _steps(self, now: Observation, images: tuple[CameraImage, ...]) -> PlanSteps:
+    def _steps(self, now: Observation, motion: str, images: tuple[CameraImage, ...]) -> PlanSteps:
         async def describe() -> Context:
-            return describe_with_traffic(now)
+            context = describe_with_traffic(now)
+            return replace(context, text=f"{context.text}\n{motion}")
 
         async def recall(instruction: Instruction, context: Context) -> History:
             del instruction, context
@@ -294,6 +302,33 @@ def situation_of(ctx: DriveContext, limit_mps: float) -> Scenario | None:
         "tick": max(0, round(ctx.time_now_us * 1e-6 / DT_S)),
     }
     return Scenario(session.scene_id or session.uuid, "route", config, session.seed)
+
+
+def motion_of(ctx: DriveContext, now: Observation) -> str:
+    """Own motion over 2 s and where the route turns, in words for C; before the rollout the car drove straight on."""
+    session, here = ctx.session, ctx.session.latest_pose()
+    history = np.zeros((HISTORY + 1, 3))
+    for i in range(HISTORY):
+        back_s = (HISTORY - i) * STEP_S
+        then_us = ctx.time_now_us - round(back_s * 1e6)
+        with session.lock:
+            known = session.ego_trajectory.timestamps_us
+            pose = session.ego_trajectory.interpolate(then_us) if known and known[0] <= then_us else None
+        if pose is None or here is None:
+            history[i] = -back_s * now.ego.speed_mps, 0.0, 0.0
+            continue
+        seen = here.inverse() @ pose
+        history[i] = seen.position[0], seen.position[1], seen.yaw
+    return motion_words(history, _command(now))
+
+
+def _command(now: Observation) -> str:
+    """What nuScenes' users take for the navigation's command: which side the route lies on after three seconds."""
+    centre = now.road[LANE].centre
+    ahead = centre.nearest(now.ego.x_m, now.ego.y_m) + max(now.ego.speed_mps, _LEAST_MPS) * STEP_S * FUTURE
+    there = centre.at(min(ahead, centre.length_m))
+    aside = Pose(now.ego.x_m, now.ego.y_m, now.ego.heading_rad).sees(there.x_m, there.y_m)[1]
+    return "go straight" if abs(aside) < _ASIDE_M else "turn left" if aside > 0.0 else "turn right"
 
 
 def _before(route: list[tuple[float, float]]) -> tuple[float, float]:

@@ -28,7 +28,6 @@ from chauffeur.concept import (
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, KinematicBicycle, advanced
 from chauffeur.geometry import Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.skeleton import WorldBase, config_of, finite, set_up
@@ -94,7 +93,7 @@ class RouteManoeuvre:
     goal_m: float | None = None
 
 
-class RouteDriver(LaneDriver):
+class BendAwareDriver(LaneDriver):
     """The lane driver, slower before bends and before the end of the route, beyond which nothing is known."""
 
     def settle(self, setpoints: Setpoints) -> Setpoints:
@@ -111,7 +110,7 @@ class RouteDriver(LaneDriver):
         return replace(settled, target_speed_mps=min(settled.target_speed_mps, fastest))
 
 
-class RouteWorld(WorldBase[ObservedPerception, RouteDriver]):
+class RouteWorld(WorldBase[ObservedPerception, BendAwareDriver]):
     """A car on its route, stepped at 10 Hz as a kinematic bicycle."""
 
     engine = "route 1 (kinematic bicycle)"
@@ -155,14 +154,12 @@ class RouteWorld(WorldBase[ObservedPerception, RouteDriver]):
         rear = Pose(config.x_m, config.y_m, config.heading_rad)
         self._state = BicycleState(rear, max(0.0, config.speed_mps), 0.0, config.acceleration_mps2)
         self._agents = tuple(
-            VehicleState(
-                i, one.kind, one.x_m, one.y_m, one.heading_rad, one.speed_mps, one.length_m, one.width_m, None
-            )
+            VehicleState(i, one.kind, one.x_m, one.y_m, one.heading_rad, one.speed_mps, one.length_m, one.width_m, None)
             for i, one in enumerate(config.agents, EGO + 1)
         )
         self._tick, self._crashed, self._shown = config.tick, False, None
         self._perception = ObservedPerception(self.observe)
-        self._driver = RouteDriver(self.observe, self._perception)
+        self._driver = BendAwareDriver(self.observe, self._perception)
         return self.observe()
 
     def step(self, command: Command) -> Command:
