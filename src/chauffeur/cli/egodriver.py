@@ -29,7 +29,7 @@ def egodriver(
     """Serve a planner to a driving simulator that asks `egodriver.EgodriverService` for the next seconds of the way."""
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.parts import planner_named
-    from chauffeur.concept import ConfigError, MissingExtraError
+    from chauffeur.concept import ConfigError, MissingExtraError, PersonId
     from chauffeur.concept.units import MPS_PER_KMH
     from chauffeur.driving.session import parse_wish
 
@@ -43,7 +43,7 @@ def egodriver(
     if not host or not port.isdecimal() or int(port) > 65535:
         raise ConfigError(f"{listen!r} is no place to listen at.", hint="Write HOST:PORT, e.g. 127.0.0.1:50051.")
     mind = planner_named(planner, base_url)
-    driver = EgoDriver(mind, parse_wish(wish, "").text, limit_mps=speed_limit * MPS_PER_KMH)
+    driver = EgoDriver(mind, parse_wish(wish, PersonId("")).text, limit_mps=speed_limit * MPS_PER_KMH)
     stdout().print(plain(f"{mind.id} drives on {listen} for {runtime}; Ctrl-C ends."))
     try:
         run_server(driver, port=int(port), host=host, mode=runtime)
