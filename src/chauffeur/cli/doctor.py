@@ -69,7 +69,8 @@ def doctor() -> None:
     console.print(columns(rows))
 
     console.print("\nExtras", style="bold")
-    lines: list[tuple[str, Text]] = [("lab", Text.assemble("benchmarks and training: ", good if has_lab() else optional))]
+    lab = good if has_lab() else optional
+    lines: list[tuple[str, Text]] = [("lab", Text.assemble("benchmarks and training: ", lab))]
     if not has_lab():
         lines.append(("", Text(install_command(), "cyan")))
     for extra, parts in extras.items():

@@ -122,7 +122,7 @@ show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 if has_lab():
-    from chauffeur.cli import lab
+    from chauffeur.cli.lab import commands as lab
 
     lab.mount(app, look=LOOK, measure=MEASURE, build=BUILD)
 
