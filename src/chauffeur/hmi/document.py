@@ -16,9 +16,9 @@ def fill(template: str, values: Mapping[str, str]) -> str:
     return _SLOT.sub(lambda match: values[match.group(1)], template)
 
 
-def asset(name: str) -> str:
-    """Text of a file of `hmi/assets`."""
-    return resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+def asset(name: str, package: str = "chauffeur.hmi") -> str:
+    """Text of a file in the folder `assets` of a package."""
+    return resources.files(package).joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def content_hash(text: str) -> str:
