@@ -36,8 +36,8 @@ from chauffeur.bench.lampilot.metrics import ORIGIN, driving_score, points
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rehearse import rehearsed
 from chauffeur.concept import Scenario, ScenarioError
+from chauffeur.driving.episode import drive_program
 from chauffeur.driving.rehearsal import best_of
-from chauffeur.driving.session import drive_program
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -14,7 +14,7 @@ from chauffeur.bench.lampilot.expert.programs import PROGRAMS, SPREAD, TUNED, op
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, Scenario, ScenarioError, Thoughts
-from chauffeur.driving.session import drive_program
+from chauffeur.driving.episode import drive_program
 from chauffeur.programs import UNHURRIED, Sandbox, check_source
 from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld

@@ -26,7 +26,7 @@ from chauffeur.bench.passengers.loader import STEMS, parse_wishes
 from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Observation
 from chauffeur.describe import describe
-from chauffeur.driving.session import drive_without_program
+from chauffeur.driving.episode import drive_without_program
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
 

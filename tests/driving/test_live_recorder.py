@@ -16,9 +16,9 @@ from chauffeur.driving.live.recorder import LiveRecorder, Unanswered, unanswered
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Runtime
-from chauffeur.driving.live.trip_memory import trip_of
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session_recorder import DriveRecorder, open_audit
+from chauffeur.driving.trips import live_trip
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.safety.audit import AuditLog, AuditRecord, read_records, redact, verify, words_of
 
@@ -92,7 +92,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
         with opened as runtime:
             _three_wishes(runtime, books, log)
         for interaction in runtime.interactions.values():
-            trip = trip_of(interaction, start, DT_S, runtime.report)
+            trip = live_trip(interaction, start, DT_S, runtime.report)
             assert trip is not None
             memory.remember(trip, None)
     return log

@@ -86,11 +86,12 @@ def talk(
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
+    from chauffeur.driving.episode import make_world
     from chauffeur.driving.live.recorder import LiveRecorder, unanswered
     from chauffeur.driving.live.settings import Settings
     from chauffeur.driving.live.starts import Start
     from chauffeur.driving.scenarios import find, lasting, planner_for, seeds_with_lead, suiting
-    from chauffeur.driving.session import make_world, parse_wish
+    from chauffeur.driving.session import parse_wish
     from chauffeur.driving.surroundings import services_file
     from chauffeur.driving.talk.session import WELL, Talk
     from chauffeur.driving.talk.sound import Sound

@@ -36,7 +36,7 @@ from chauffeur.concept import (
 )
 from chauffeur.driving.events import DriveEvent, EventKind
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.safety.audit.entries import Kind
 from chauffeur.safety.audit.keys import read_key
 from chauffeur.safety.audit.redaction import PERSON

@@ -36,6 +36,7 @@ from chauffeur.concept import (
     PersonId,
     Plan,
     PlanRequest,
+    Scenario,
     SystemMessage,
     Thoughts,
     Trip,
@@ -54,8 +55,7 @@ from chauffeur.driving.onroad.checks import (
 )
 from chauffeur.driving.onroad.recorder import VehicleRecorder
 from chauffeur.driving.onroad.thoughts import refused_in_own_words, speed_text
-from chauffeur.driving.onroad.trips import make_trip
-from chauffeur.driving.onroad.vehicle_observation import VehicleObservation, counted_from, describe_vehicle
+from chauffeur.driving.onroad.vehicle_observation import WORLD, VehicleObservation, counted_from, describe_vehicle
 from chauffeur.driving.planning import (
     PLAN_WITHIN_S,
     RECALLED,
@@ -68,6 +68,7 @@ from chauffeur.driving.planning import (
 from chauffeur.driving.questions import NOT_MEANT, NOTHING_ASKED, TAKEN_BACK, Conversing
 from chauffeur.driving.session import MAX_WISH_CHARACTERS
 from chauffeur.driving.session_recorder import FLUSH_TIMEOUT_S
+from chauffeur.driving.trips import vehicle_trip
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import cancels, takes_back
 from chauffeur.language.questions import said_aside
@@ -172,7 +173,9 @@ class VehicleSession:
         most_mps = stack.limits.max_speed_mps
         self.limits: Final = personal_limits(person, Limits("vehicle", max_over_limit_mps=0.0, max_speed_mps=most_mps))
         self.dry_run: Final = vehicle.state().link == "dry-run"
-        self._began = clock().isoformat(timespec="milliseconds")
+        began = clock().isoformat(timespec="milliseconds")  # two sessions' trips are never the same
+        about = {"interface": settings.interface, "dry_run": self.dry_run, "began": began}
+        self._scenario = Scenario(f"{WORLD}:{settings.interface}", WORLD, about, 0)
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
@@ -548,18 +551,7 @@ class VehicleSession:
 
     async def _remember(self, request: PlanRequest, answer: OnRoadAnswer) -> OnRoadAnswer:
         assert answer.plan is not None
-        trip = make_trip(
-            request,
-            answer.plan,
-            answer.verdicts,
-            answer.status,
-            answer.words,
-            number=answer.wish,
-            began=self._began,
-            interface=self._settings.interface,
-            dry_run=self.dry_run,
-            confirmed_s=answer.confirmed_s,
-        )
+        trip = vehicle_trip(request, answer.plan, answer, self._scenario)
         await self._keep(answer.wish, trip)
         return replace(answer, trip=trip.id)
 

@@ -23,7 +23,6 @@ from chauffeur.driving.live.mirror import live_world
 from chauffeur.driving.live.recorder import LiveRecorder
 from chauffeur.driving.live.settings import Settings, ring
 from chauffeur.driving.live.supervisor import Interaction, Runtime
-from chauffeur.driving.live.trip_memory import trip_of
 from chauffeur.driving.questions import NOTHING_ASKED
 from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.driving.talk.attention import Attention
@@ -55,6 +54,7 @@ from chauffeur.driving.talk.tally import Tally
 from chauffeur.driving.talk.view import View
 from chauffeur.driving.talk.voice import Voice
 from chauffeur.driving.talk.wish_queue import OVER, WishQueue, Words
+from chauffeur.driving.trips import live_trip
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import answer_in, cancels, takes_back
@@ -442,7 +442,7 @@ class Talk:
             return
         trip = max(1, interaction.answer.trip or (0 if runtime.report is None else runtime.report.trip))
         start = self._settings.starts[min(trip, len(self._settings.starts)) - 1]
-        keeper.trip(interaction.request.wish, trip_of(interaction, start, self._dt_s, runtime.report))
+        keeper.trip(interaction.request.wish, live_trip(interaction, start, self._dt_s, runtime.report))
 
     # The drive --------------------------------------------------------------------------------------------------------
 
