@@ -15,7 +15,8 @@ from chauffeur.concept import NOBODY, Limits, Parameters, Plan, PlanRequest, Pro
 from chauffeur.driving.emergency import ASKED, GOING_ON, QUESTION, STOPPING
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleSession
+from chauffeur.driving.onroad.answers import OnRoadAnswer
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session, parse_wish

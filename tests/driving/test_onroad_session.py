@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,13 +28,16 @@ from chauffeur.concept import (
     PlanRequest,
     ProfileError,
     Program,
+    Result,
     Thoughts,
 )
 from chauffeur.driving import questions
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleRecorder, VehicleSession, open_recorder
 from chauffeur.driving.onroad import session as onroad
+from chauffeur.driving.onroad.answers import OnRoadAnswer
 from chauffeur.driving.onroad.checks import fitted, is_about_engaging, is_stop
+from chauffeur.driving.onroad.session import VehicleSession
+from chauffeur.driving.recorder import DriveRecorder, open_vehicle_audit
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
@@ -173,7 +177,7 @@ def test_what_is_not_asked_of_the_vehicle(embedded: Planner, wish: str, status: 
     (answer,) = ask(embedded, wish)
     assert (answer.status, answer.published) == (status, None), answer.words
     assert said in answer.words
-    assert not answer.done
+    assert answer.result is Result.DECLINED
 
 
 def test_the_tightest_bound_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -478,7 +482,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
             return apply(parameters)
 
     async def whole() -> None:
-        with open_recorder(path, file, "rosbridge", dry_run=True) as books:
+        with open_vehicle_audit(path, file, "rosbridge", dry_run=True) as books:
             async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
                 await road.evaluate("nice")
@@ -503,18 +507,20 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
     assert letters == ["C", "H", "S", "F", "C", "H", "S"]
 
 
-class Full(VehicleRecorder):
+class Full(DriveRecorder):
     """Books on a disk that takes nothing."""
 
-    def kept(self, within_s: float = 0.0) -> bool:
-        return False
+    def kept(self, within_s: float = 0.0) -> Future[bool]:
+        never: Future[bool] = Future()
+        never.set_result(False)
+        return never
 
 
 def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path) -> None:
     file = tmp_path / "vehicle.toml"
     file.write_text(FILE)
-    log = open_recorder(tmp_path / "audit.jsonl", file, "rosbridge", dry_run=True)
-    with Full(log._log) as books:
+    log = open_vehicle_audit(tmp_path / "audit.jsonl", file, "rosbridge", dry_run=True)
+    with Full(log.log) as books:
         answers = ask(gives(5.0), "x", "stop", books=books)
     assert [one.status for one in answers] == ["failed", "dry-run"]
     assert "Nothing was published" in answers[0].words
@@ -532,7 +538,7 @@ def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
     kinds = ("link", "wish", "context", "plan", "verdicts", "asking", "asked", "answer")
     told = [word for word in done.stdout.split() if word in kinds]
     assert told == ["wish", *(kind for kind in kinds if kind != "wish")]
-    assert "dry-run Planned speeds are capped" in done.stdout
+    assert "done Planned speeds are capped" in done.stdout
 
 
 def test_it_ends_with_what_stays(embedded: Planner) -> None:

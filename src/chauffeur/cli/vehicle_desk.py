@@ -10,7 +10,7 @@ from typing import Final
 
 from chauffeur.cli.lines import Lines, standard_input
 from chauffeur.cli.vehicle_screen import VehicleScreen
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.driving.onroad.spoken import listening
 from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.driving.talk.attention import Attention

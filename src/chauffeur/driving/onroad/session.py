@@ -53,7 +53,6 @@ from chauffeur.driving.onroad.checks import (
     is_about_engaging,
     is_stop,
 )
-from chauffeur.driving.onroad.recorder import VehicleRecorder
 from chauffeur.driving.onroad.thoughts import refused_in_own_words, speed_text
 from chauffeur.driving.onroad.vehicle_observation import WORLD, VehicleObservation, counted_from, describe_vehicle
 from chauffeur.driving.planning import (
@@ -66,8 +65,8 @@ from chauffeur.driving.planning import (
     plan_once,
 )
 from chauffeur.driving.questions import NOT_MEANT, NOTHING_ASKED, TAKEN_BACK, Conversing
+from chauffeur.driving.recorder import FLUSH_TIMEOUT_S, DriveRecorder
 from chauffeur.driving.session import MAX_WISH_CHARACTERS
-from chauffeur.driving.session_recorder import FLUSH_TIMEOUT_S
 from chauffeur.driving.trips import vehicle_trip
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import cancels, takes_back
@@ -137,7 +136,7 @@ class VehicleSession:
         person: PersonId = NOBODY,
         memory: Memory | None = None,
         sources: Sources | None = None,
-        books: VehicleRecorder | None = None,
+        books: DriveRecorder | None = None,
         tell: Listener = nobody_listens,
         confirm_within_s: float = CONFIRM_WITHIN_S,
         clock: Callable[[], datetime] = utc_now,
@@ -454,8 +453,8 @@ class VehicleSession:
         if self._books is not None:
             slows = parameters.target_speed_mps <= (0.0 if before is None else before.target_speed_mps)
             within_s = BRIEFLY_S if slows else FLUSH_TIMEOUT_S
-            if not await asyncio.to_thread(self._books.kept, within_s):
-                why = f"The audit log could not be written in time. {self._books.trouble}".rstrip()
+            if not await asyncio.wrap_future(self._books.kept(within_s)):
+                why = f"The audit log could not be written in time. {self._books.log.trouble}".rstrip()
                 if not slows:
                     return replace(answer, status="failed", words=f"{why} Nothing was published.")
                 self._say("trouble", f"{why} A lower speed is asked for all the same.", number)

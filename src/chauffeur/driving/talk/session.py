@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Final, Self
 
-from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan
+from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan, Result
 from chauffeur.concept.units import kmh
 from chauffeur.driving.emergency import GOING_ON, STOPPING, brings_to_a_stand, question_to, stop_wanted
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.live.messages import Report
+from chauffeur.driving.live.messages import LiveEnd, Report
 from chauffeur.driving.live.mirror import live_world
-from chauffeur.driving.live.recorder import LiveRecorder
 from chauffeur.driving.live.settings import Settings, ring
 from chauffeur.driving.live.supervisor import Interaction, Runtime
 from chauffeur.driving.questions import NOTHING_ASKED
+from chauffeur.driving.recorder import DriveRecorder
 from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.driving.talk.attention import Attention
 from chauffeur.driving.talk.conversations import Conversations
@@ -109,7 +109,7 @@ class Talk:
         tell: Callable[[Said], None],
         *,
         person: PersonId = NOBODY,
-        books: LiveRecorder | None = None,
+        books: DriveRecorder | None = None,
         engine: AsrEngine | None = None,
         sound: Sound | None = None,
         voice: Voice | None = None,
@@ -164,8 +164,6 @@ class Talk:
             runtime = Runtime(self._settings, self._heard)
             self._runtime = runtime
             self._view = View(self._settings, ring(runtime.folder, "observations"))
-            if self._books is not None:
-                self._books.follow(runtime, self._settings)
             self._introduce()
             runtime.__enter__()
         except BaseException:
@@ -280,17 +278,17 @@ class Talk:
             return False
         match found:
             case Emergency(kind="stop"):
-                self._asking.pass_over(words.text, "stopped", STOPPING)
+                self._asking.pass_over(words.text, "halt", Result.DONE, STOPPING)
                 self._stop()
             case Emergency(kind="safe_stop") if not self._shoulder():
-                self._asking.pass_over(words.text, "stopped", STOPPING)
+                self._asking.pass_over(words.text, "halt", Result.DONE, STOPPING)
                 self._say(Note("There is no shoulder here."))
                 self._stop()
             case Emergency(kind="ask"):
-                self._asking.pass_over(words.text, "asked_back", question_to(found))
+                self._asking.pass_over(words.text, "declined", Result.ASKED_BACK, question_to(found))
                 self._attention.offer(question_to(found), SAFE_STOP_WISH)
             case Emergency(kind="no_stop", alone=True) if not self._is_stopping_by_plan():
-                self._asking.pass_over(words.text, "answered", GOING_ON)
+                self._asking.pass_over(words.text, "answered", Result.DONE, GOING_ON)
                 self._say(Note(GOING_ON))
                 self._speak(GOING_ON)
             case _:
@@ -313,17 +311,17 @@ class Talk:
         if self._emergency(words):
             return
         if ends_session(words.text) and not self._stopping:
-            self._asking.pass_over(words.text, "answered", LEAVING)
+            self._asking.pass_over(words.text, "answered", Result.DONE, LEAVING)
             self._say(Note(LEAVING))
             self._stop()
             return
         if takes_back(words.text) and not self._may_be_taken_back(cancels(words.text)):
-            self._asking.pass_over(words.text, "answered", NOTHING_ASKED)
+            self._asking.pass_over(words.text, "answered", Result.DONE, NOTHING_ASKED)
             self._say(Note(NOTHING_ASKED))
             return
         if self._stopping:
             self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
-            self._asking.pass_over(words.text, "not_asked", OVER)
+            self._asking.pass_over(words.text, "unasked", Result.NOT_DONE, OVER)
             return
         if self._runtime is not None and self._runtime.taken_over:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
@@ -557,7 +555,8 @@ class Talk:
             self._say(Note(f"Not asked: “{text}”. {OVER}"))
         self.tally.end(runtime, died=self.outcome == "died")
         if self._books is not None:
-            self._books.end(self.outcome, self.tally.figures, runtime.lost_reports)
+            end = LiveEnd(self.outcome, self.tally.figures or {}, runtime.lost_reports)
+            self._books.tell(DriveEvent("over", value=end))
         if self._keeper is not None:
             for news in self._keeper.close(ABORTED_WITHIN_S if self.outcome == "aborted" else CLOSE_WITHIN_S):
                 self._kept(news)
