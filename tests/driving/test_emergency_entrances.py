@@ -205,7 +205,7 @@ def test_a_vehicle_is_asked_for_a_stop_and_for_none_that_was_refused() -> None:
     async def steps() -> list[OnRoadAnswer]:
         async with VehicleSession(vehicle, file, Never()) as road:
             texts = (*STOPS, *REFUSALS, *DISTRESS)
-            return [await road.ask(text) for text in texts] + [await road.evaluate(STOPS[1])]
+            return [await road.ask(text) for text in texts] + [await road.feedback(STOPS[1])]
 
     answers = asyncio.run(steps())
     vehicle.close()

@@ -323,7 +323,7 @@ def test_feedback_takes_no_wish_s_place() -> None:
         wish = asyncio.create_task(road.ask("Drive."))
         while not planner.requests:
             await asyncio.sleep(0.001)
-        assert (await road.evaluate("too slow")).status == "declined"
+        assert (await road.feedback("too slow")).status == "declined"
         go.set()
         assert (await wish).status == "dry-run"
 
@@ -347,7 +347,7 @@ def test_listeners_and_memories_that_fail_take_nothing_down(caplog: pytest.LogCa
         road = VehicleSession(car, settings, gives(5.0), person=ANA, memory=Broken(), tell=deaf)  # type: ignore[arg-type]
         async with road:
             assert (await road.ask("Drive.")).status == "dry-run"
-            assert (await road.evaluate("fine")).status == "declined"
+            assert (await road.feedback("fine")).status == "declined"
         after = await road.ask("Drive.")
         assert (after.status, after.words) == ("failed", "The session is over.")
 
@@ -407,7 +407,7 @@ def test_it_is_remembered_and_recalled(tmp_path: Path, embedded: Planner, asked_
     async def steps(road: VehicleSession) -> None:
         answers.append(await road.ask("Drive at 30 km/h."))
         opinion = "That was too fast."
-        answers.append(await road.evaluate(opinion) if asked_for else await road.ask(opinion))
+        answers.append(await road.feedback(opinion) if asked_for else await road.ask(opinion))
 
     drive(embedded, steps, person=ANA, memory=memory)
     assert answers[0].status == "dry-run" and (answers[1].status == "taken" or not asked_for)
@@ -457,8 +457,8 @@ def test_feedback_without_a_drive(tmp_path: Path, embedded: Planner) -> None:
     said: list[OnRoadAnswer] = []
 
     async def steps(road: VehicleSession) -> None:
-        said.append(await road.evaluate("too fast"))
-        said.append(await road.evaluate("  "))
+        said.append(await road.feedback("too fast"))
+        said.append(await road.feedback("  "))
 
     drive(embedded, steps)
     drive(embedded, steps, person=ANA, memory=VaultMemory(tmp_path / "home"))
@@ -485,7 +485,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
         with open_vehicle_audit(path, file, "rosbridge", dry_run=True) as books:
             async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
-                await road.evaluate("nice")
+                await road.feedback("nice")
                 await road.ask("Change to the left lane.")
 
     asyncio.run(whole())
