@@ -68,7 +68,7 @@ def other_versions(recorded: RecordedTrip) -> list[str]:
     """What has changed on this machine since the recording, as far as it could matter."""
     import platform
 
-    from chauffeur.driving.session import make_world
+    from chauffeur.driving.episode import make_world
     from chauffeur.version import __version__
 
     changed: list[str] = []
