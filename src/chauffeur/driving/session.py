@@ -398,7 +398,7 @@ def make_trip(
         said=() if episode is None else episode.said,
         record=record,
         unused=() if episode is None else unused_of(request.instruction.text, plan),
-        parts_done=None if episode is None else episode.parts_done,
+        parts=() if episode is None else episode.parts,
         judged_by="" if episode is None else episode.judged_by,
     )
 

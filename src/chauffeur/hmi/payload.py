@@ -86,7 +86,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "outcome": {
             "label": label,
             "tone": tone,
-            "causes": [said(text) for text in (*words.left_out_words(trip), *words.cause_words(trip.causes))],
+            "causes": [said(text) for text in words.cause_words(trip.causes)],
             "result": str(result_of(trip)),
             "judged": words.judged_words(trip),
             "end": words.end_words(trip),
