@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 
 from chauffeur.concept import (
@@ -25,12 +25,12 @@ from chauffeur.concept import (
     Trip,
     VehicleState,
     Verdict,
-    result_of,
 )
 from chauffeur.concept.paint import css_colour
 from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
 from chauffeur.driving.recording import RecordedTrip
+from chauffeur.geometry.road_graph import TURNS
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
@@ -45,6 +45,11 @@ _STRAIGHT_M = 0.05
 _SIGHT_M = 260.0
 """Nothing farther from the ego's path than this is ever on the screen."""
 
+_FELT = ("_mps", "_m", "_s")
+"""Ends of the names of settings that a person feels; gains and indices have none."""
+_AHEAD_M = 30
+"""So far along its route, in its points of one metre, a car gets in no control period."""
+
 Json = dict[str, Any]
 
 
@@ -52,32 +57,26 @@ def page_payload(recorded: RecordedTrip) -> Json:
     """Everything the page shows."""
     trip = recorded.trip
     unit = words.pace_of(trip.instruction.text)
-    _, label, tone = words.trip_words(trip)
+    sign, label, tone = words.trip_words(trip)
 
     def said(text: str) -> str:
         return words.passenger_units(text, unit)
 
     return {
         "pace": {"unit": unit, "of": 1.0 / (MPS_PER_MPH if unit == "mph" else MPS_PER_KMH)},
-        "going_to": trip.plan.policy.route if isinstance(trip.plan.policy, Parameters) else "",
+        "going_to": goal_of(trip).replace("_", " "),
         "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
         "person": trip.instruction.person,
-        "source": trip.instruction.source,
         "title": recorded.scenario.title or recorded.scenario.id,
         "context": trip.context.text,
         "intent": trip.plan.intent,
-        "refusal": said(trip.plan.refusal),
-        "settings": [words.setting(name, value, unit) for name, value in trip.plan.settings],
-        "thoughts": said(trip.plan.thoughts.text),
+        "settings": [words.setting(name, value) for name, value in trip.plan.settings],
+        "thoughts": said("" if trip.plan.thoughts.text == trip.plan.refusal else trip.plan.thoughts.text),
         "view": "" if recorded.view is None else _data_uri(recorded.view.png()),
         "program": _program_lines(trip.plan.policy),
-        "policy": policy_words(trip.plan.policy, unit),
-        "verdicts": [
-            {"check": v.check, "passed": v.passed, "reason": said(_reason(v)), "line": v.line, "remedy": said(v.remedy)}
-            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark], "not_compared": v.not_compared}
-            for v in trip.verdicts
-        ],
+        "policy": policy_words(trip.plan.policy),
+        "verdicts": [_verdict(one, said) for one in trip.verdicts],
         "mismatches": [
             {"kind": KINDS[one.kind], "said": said(one.sentence), "instead": said(one.instead), "line": one.line}
             for one in _mismatches(trip)
@@ -86,20 +85,37 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "outcome": {
             "label": label,
             "tone": tone,
-            "causes": [said(text) for text in words.cause_words(trip.causes)],
-            "result": str(result_of(trip)),
+            "sign": sign,
+            "account": words.account_words(trip),
+            "causes": [said(text) for text in words.cause_words(trip.causes) if trip.outcome != "refused"],
             "judged": words.judged_words(trip),
             "end": words.end_words(trip),
         },
         "duration": round(trip.duration_s, 2),
         "metrics": [
-            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m, unit), "applies": m.applies}
+            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m), "applies": m.applies}
             for m in trip.metrics
         ],
         "history": [_history_item(item, unit) for item in trip.history.items],
         "provenance": [list(pair) for pair in provenance(trip)],
-        "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": e.label} for e in events_of(recorded)],
+        "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": said(e.label)} for e in events_of(recorded)],
         "drive": _drive(recorded),
+    }
+
+
+def goal_of(trip: Trip) -> str:
+    """The place that a drive leads to, as its plan names it; empty where it leads to none."""
+    policy = trip.plan.policy
+    return policy.route if isinstance(policy, Parameters) and policy.route not in TURNS else ""
+
+
+def _verdict(verdict: Verdict, said: Callable[[str], str]) -> Json:
+    return {
+        "name": words.check_name(verdict.check),
+        "reason": said(_reason(verdict)),
+        "remedy": said(verdict.remedy),
+        "sign": words.MARKS[verdict.mark],
+        **{name: getattr(verdict, name) for name in ("check", "passed", "line", "vetoes", "mark")},
     }
 
 
@@ -257,10 +273,8 @@ def _history_item(item: HistoryItem, unit: SpeedUnit) -> Json:
     return {
         "when": item.when,
         "instruction": item.instruction,
-        "intent": item.intent,
         "outcome": str(result_of_stored(item.outcome, item.intent)),
-        "similarity": round(item.similarity, 2),
-        "settings": [words.setting(name, value, unit) for name, value in item.settings],
+        "settings": [words.setting(name, value, unit) for name, value in item.settings if name.endswith(_FELT)],
         "feedback": [{"text": f.text, "meaning": words.feedback_words(f)} for f in item.feedback],
     }
 
@@ -297,6 +311,8 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
         "lead": [s.front.vehicle if s.front else None for s in shots],
         "stop": [_rounded(s.stop_sign_m) for s in shots],
+        "to_go": _to_go(seen) if goal_of(recorded.trip) else None,
+        "arrives": recorded.trip.outcome == "success",
         "lane": [_lane_words(s) for s in shots],
         "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
         "turn": [row.setpoints.turn if row else None for row in rows],
@@ -305,6 +321,23 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "calls": [[[c.name, c.args, c.result] for c in row.calls] if row else [] for row in rows],
         "said": [[round(f.observation.time_s, 2), text] for f in frames for text in f.said],
     }
+
+
+def _to_go(seen: Sequence[Observation]) -> list[float] | None:
+    """Distance along the route to its end at each instant, m; None without a route.
+
+    The car's place on it is looked for from where it last was: a route may come by the same spot twice.
+    """
+    route = seen[0].route
+    if route is None or route.length_m(seen[0].road) <= 0.0:
+        return None
+    line = route.dense(seen[0].road)
+    at, found = 0, list[float]()
+    for shot in seen:
+        ahead = range(at, min(at + _AHEAD_M, len(line)))
+        at = min(ahead, key=lambda i: math.hypot(line[i].x_m - shot.ego.x_m, line[i].y_m - shot.ego.y_m))
+        found.append(round(line[-1].station_m - line[at].station_m, 1))
+    return found
 
 
 def _rounded(value: float | None) -> float | None:
@@ -375,9 +408,9 @@ def _lights(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
 
 def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[Json]:
     """The places of a town that come into sight, and whether the drive leads there."""
-    policy = recorded.trip.plan.policy
     there = places_of(recorded.scenario)
-    meant = places_called(there, policy.route) if isinstance(policy, Parameters) and policy.route else ()
+    goal = goal_of(recorded.trip)
+    meant = places_called(there, goal) if goal else ()
     found: list[Json] = []
     for place in there:
         x, y = place_facing_right(first, place.x_m, place.y_m)

@@ -50,6 +50,14 @@ def simulated(world: str) -> str:
     return _OTHER_PHYSICS.get(world, SIMULATED)
 
 
+_SIGNS: Final[dict[Result, str]] = {
+    Result.DONE: "✓",
+    Result.PARTLY_DONE: "~",
+    Result.NOT_DONE: "✕",
+    Result.ASKED_BACK: "?",
+    Result.DECLINED: "–",
+    Result.FAILED: "✕",
+}
 _ENDED: Final[dict[Outcome, str]] = {
     "collision": "it ended in a collision",
     "off_road": "the car left the road",
@@ -145,8 +153,8 @@ def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
         label = f"{label} after {trip.duration_s:.0f} s"
     if tone != "bad" and unexplained(trip.verdicts):
         return MARKS["differs"], f"{label}, not as explained", "neutral"
-    signs: dict[Tone, str] = {"good": MARKS["passed"], "bad": MARKS["failed"], "neutral": "■"}
-    return signs[tone], label, tone
+    sign = MARKS["not_compared"] if trip.outcome == "ended" and result is Result.DONE else _SIGNS[result]
+    return sign, label, tone
 
 
 def account_words(trip: Trip) -> str:
@@ -164,14 +172,15 @@ def _account(trip: Trip) -> Iterator[str]:
     understood = [part.words for part in parts] or [*named]
     yield f"I understood: {', then '.join(understood)}" if any(understood) else ""
     done = [part.words for part in parts if part.result == "done"]
-    if parts and len(done) == len(parts):
+    if len(done) == len(parts) and (parts or trip.outcome == "success"):
         yield "done: all of it" if len(parts) > 1 else "done"
     else:
         yield f"done: {', '.join(done)}" if done else ""
         yield f"not done: {why}" if (why := _short(parts, "not_done", "opposite")) else ""
     yield _ENDED.get(trip.outcome, "")
     yield f"not compared: {why}" if (why := _short(parts, "not_judged")) else ""
-    yield "not compared: nothing in this drive can be held against the words" if not parts else ""
+    if trip.outcome == "ended" and not parts:
+        yield "not compared: nothing in this drive can be held against the words"
     if trip.unused:
         yield f"not used: {', '.join(f'“{words}”' for words in trip.unused)}"
 
