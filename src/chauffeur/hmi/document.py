@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping
 from importlib import resources
 
+_EXPORT = re.compile(r"^export ", re.MULTILINE)
 _SLOT = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -17,8 +18,9 @@ def fill(template: str, values: Mapping[str, str]) -> str:
 
 
 def asset(name: str) -> str:
-    """Text of a file of `hmi/assets`."""
-    return resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+    """Text of a file of `hmi/assets`; of a module, without the `export` that a script of one piece cannot have."""
+    text = resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+    return _EXPORT.sub("", text) if name.endswith(".js") else text
 
 
 def content_hash(text: str) -> str:

@@ -22,7 +22,7 @@ from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.drive_svg import SYMBOLS, draw_strip
 from chauffeur.hmi.payload import program_tokens
 
-_STYLES = ("trip.css", "panels.css", "report.css")
+_STYLES = ("scene.css", "trip.css", "panels.css", "report.css")
 _DIRECTIONS = {
     "higher": '<span class="better" title="higher is better">↑<span class="hidden"> higher is better</span></span>',
     "lower": '<span class="better" title="lower is better">↓<span class="hidden"> lower is better</span></span>',

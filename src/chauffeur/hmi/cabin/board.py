@@ -10,14 +10,15 @@ from typing import Any, Final
 from chauffeur.concept import Lane, RoadGraph
 from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
-from chauffeur.hmi.road import Bounds, draw_road
+from chauffeur.hmi.road import Bounds, as_json, draw_road, flat
+from chauffeur.hmi.view import mirrored
 
 _MARGIN_M = 20.0
 _ON_FOOT = ("sidewalk", "crossing")
 
 
 def drawn(road: Road) -> dict[str, Any]:
-    """As a JSON object: the lanes as they were told, and what is painted on them."""
+    """As a JSON object: the lanes as they were told, and the road as the pages' drawer takes it."""
     lanes = tuple(
         Lane(
             lane.id,
@@ -28,20 +29,21 @@ def drawn(road: Road) -> dict[str, Any]:
             road=lane.road,
             index=lane.index,
             junction=lane.junction,
+            street=lane.street,
         )
         for lane in road.lanes
     )
     xs = [x for lane in lanes for x, _ in lane.centre.points_m]
     ys = [y for lane in lanes for _, y in lane.centre.points_m]
     everything = Bounds(min(xs, default=0.0), min(ys, default=0.0), max(xs, default=0.0), max(ys, default=0.0))
-    painted = draw_road(RoadGraph(lanes), (), everything.grown(_MARGIN_M))
+    signs = tuple(mirrored(one) for one in road.signs)
     return {
         "kind": road.kind,
         "world": road.world,
         "lanes": [
             {
                 "id": lane.id,
-                "p": _flat(lane.centre.points_m),
+                "p": flat(lane.centre.points_m),
                 "w": lane.width_m,
                 "road": lane.road,
                 "i": lane.index,
@@ -50,14 +52,7 @@ def drawn(road: Road) -> dict[str, Any]:
             for lane in lanes
             if lane.kind not in _ON_FOOT
         ],
-        "surfaces": [{"p": _flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in painted.surfaces],
-        "lines": [{"p": _flat(line.points_m), "s": line.style} for line in painted.lines],
-        "bars": [_flat(bar) for bar in painted.bars_m],
-    }
-
-
-def _flat(points: tuple[tuple[float, float], ...]) -> list[float]:
-    return [round(value, 2) for point in points for value in point]
+    } | as_json(draw_road(RoadGraph(lanes), (), everything.grown(_MARGIN_M), signs))
 
 
 MOST_WAITING: Final = 500

@@ -7,7 +7,7 @@ import { openLink } from './link.js';
 import { makeMemory } from './memory.js';
 import { makeMicrophone } from './microphone.js';
 import { makeScene } from './scene.js';
-import { NOT_HEARD, kmh, levelWords } from './words.js';
+import { NOT_HEARD, atMost, levelWords, speakIn, unitNow, whole } from './words.js';
 
 const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
@@ -43,7 +43,7 @@ const does = {
   seat_view(told) { showSeat(told); },
   listening(told) { listening = told; showHeard(); },
   heard(told) { showHeardWords(told); },
-  conversation(told) { conversation.told(told); },
+  conversation(told) { speakIn(told.text); conversation.told(told); },
   how_was_it(told) { conversation.askFor(told); },
   memory(told) { memory.told(told); },
   note(told) { conversation.note(told); },
@@ -160,12 +160,12 @@ function showScene() {
   road.show(scene);
   conversation.follow(scene);
   const speed = Math.abs(scene.ego.speed_mps);
-  write($('speed'), String(kmh(speed)));
-  write($('speed-mps'), `${speed.toFixed(1)} m/s`);
-  write($('limit'), scene.limit_mps > 0 ? String(kmh(scene.limit_mps)) : '–');
+  write($('speed'), String(whole(speed)));
+  write($('limit'), scene.limit_mps > 0 ? String(atMost(scene.limit_mps)) : '–');
   const target = scene.target_mps;
-  write($('target'), target === null ? 'none' : String(kmh(target)));
-  write($('target-unit'), target === null ? '' : 'km/h');
+  write($('target'), target === null ? 'none' : String(whole(target)));
+  for (const unit of document.querySelectorAll('.unit')) write(unit, unitNow());
+  $('target-unit').hidden = target === null;
   const off = target === null ? 0 : target - speed;
   $('target-way').hidden = Math.abs(off) < 0.5;
   write($('target-sign'), off > 0 ? '▲' : '▼');
