@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -18,6 +19,8 @@ EventKind = Literal[
 
 _STANDING_MPS = 0.3
 _MOVING_MPS = 1.0
+_AT_LIGHT_M = 15.0
+"""From the car's middle to an end of the stop line: the first car or the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +78,7 @@ def _drive_events(instants: tuple[Observation, ...]) -> list[TripMark]:
             )
         if not standing and after.ego.speed_mps < _STANDING_MPS:
             standing = True
-            red = any(after.ego.lane in light.lanes and light.state == "red" for light in after.signals)
-            events.append(TripMark(after.time_s, "stopped", f"Came to a stop{' at a red light' * red}."))
+            events.append(TripMark(after.time_s, "stopped", f"Came to a stop{' at a red light' * _at_red(after)}."))
         elif standing and after.ego.speed_mps > _MOVING_MPS:
             standing = False
             stood = any(event.kind == "stopped" for event in events)
@@ -86,3 +88,9 @@ def _drive_events(instants: tuple[Observation, ...]) -> list[TripMark]:
         if after.off_road and not before.off_road:
             events.append(TripMark(after.time_s, "off_road", "Left the road."))
     return events
+
+
+def _at_red(shot: Observation) -> bool:
+    """True where the car stands before a light of its lane that is red."""
+    lights = (light for light in shot.signals if light.state == "red" and shot.ego.lane in light.lanes)
+    return any(math.dist(light.stop_line_m[0], (shot.ego.x_m, shot.ego.y_m)) < _AT_LIGHT_M for light in lights)

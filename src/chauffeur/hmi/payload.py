@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, cast
 
 from chauffeur.concept import (
@@ -30,15 +30,13 @@ from chauffeur.concept.paint import css_colour
 from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.geometry.road_graph import TURNS
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
 from chauffeur.hmi.road import Bounds, PaintedRoad, as_json, draw_road, track_box
-from chauffeur.hmi.view import facing_right, frame_drive, instants_of, place_facing_right
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+from chauffeur.hmi.wanted import goal_of, wanted
 from chauffeur.safety.faithfulness import KINDS, score_words
-from chauffeur.worlds.town.pack import places_called
-from chauffeur.worlds.town.scenarios import places_of
 
 _WAYPOINTS_TOLD = 6
 _STRAIGHT_M = 0.05
@@ -47,9 +45,6 @@ _SIGHT_M = 260.0
 
 _FELT = ("_mps", "_m", "_s")
 """Ends of the names of settings that a person feels; gains and indices have none."""
-_AHEAD_M = 30
-"""So far along its route, in its points of one metre, a car gets in no control period."""
-
 Json = dict[str, Any]
 
 
@@ -64,7 +59,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
 
     return {
         "pace": {"unit": unit, "of": 1.0 / (MPS_PER_MPH if unit == "mph" else MPS_PER_KMH)},
-        "going_to": goal_of(trip).replace("_", " "),
+        "going_to": goal_of(trip),
         "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
         "person": trip.instruction.person,
@@ -101,12 +96,6 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": said(e.label)} for e in events_of(recorded)],
         "drive": _drive(recorded),
     }
-
-
-def goal_of(trip: Trip) -> str:
-    """The place that a drive leads to, as its plan names it; empty where it leads to none."""
-    policy = trip.plan.policy
-    return policy.route if isinstance(policy, Parameters) and policy.route not in TURNS else ""
 
 
 def _verdict(verdict: Verdict, said: Callable[[str], str]) -> Json:
@@ -302,7 +291,7 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
         "cars": _cars(shots, sight),
         "lights": _lights(shots, sight),
-        "places": _places(recorded, seen[0], sight),
+        **wanted(recorded, sight),
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
@@ -311,7 +300,6 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
         "lead": [s.front.vehicle if s.front else None for s in shots],
         "stop": [_rounded(s.stop_sign_m) for s in shots],
-        "to_go": _to_go(seen) if goal_of(recorded.trip) else None,
         "arrives": recorded.trip.outcome == "success",
         "lane": [_lane_words(s) for s in shots],
         "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
@@ -321,23 +309,6 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "calls": [[[c.name, c.args, c.result] for c in row.calls] if row else [] for row in rows],
         "said": [[round(f.observation.time_s, 2), text] for f in frames for text in f.said],
     }
-
-
-def _to_go(seen: Sequence[Observation]) -> list[float] | None:
-    """Distance along the route to its end at each instant, m; None without a route.
-
-    The car's place on it is looked for from where it last was: a route may come by the same spot twice.
-    """
-    route = seen[0].route
-    if route is None or route.length_m(seen[0].road) <= 0.0:
-        return None
-    line = route.dense(seen[0].road)
-    at, found = 0, list[float]()
-    for shot in seen:
-        ahead = range(at, min(at + _AHEAD_M, len(line)))
-        at = min(ahead, key=lambda i: math.hypot(line[i].x_m - shot.ego.x_m, line[i].y_m - shot.ego.y_m))
-        found.append(round(line[-1].station_m - line[at].station_m, 1))
-    return found
 
 
 def _rounded(value: float | None) -> float | None:
@@ -405,19 +376,6 @@ def _lights(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
             if not one["s"] or one["s"][-1][1] != light.state:
                 one["s"].append([index, light.state])
     return list(found.values())
-
-
-def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[Json]:
-    """The places of a town that come into sight, and whether the drive leads there."""
-    there = places_of(recorded.scenario)
-    goal = goal_of(recorded.trip)
-    meant = places_called(there, goal) if goal else ()
-    found: list[Json] = []
-    for place in there:
-        x, y = place_facing_right(first, place.x_m, place.y_m)
-        if sight.x0 <= x <= sight.x1 and sight.y0 <= y <= sight.y1:
-            found.append({"n": place.name, "x": round(x, 1), "y": round(y, 1), "to": place in meant})
-    return found
 
 
 def _goal(row: Frame | None, shot: Observation, road: PaintedRoad) -> int | None:

@@ -244,7 +244,7 @@ def end_words(trip: Trip) -> str:
         stands = found["end-speed-v1"] < STANDS_MPS and not wanted
         speed = _beside("speed", found["end-speed-v1"], wanted, lambda speed: people_speed(speed, unit))
         parts.append("standing" if stands else speed)
-    text = ", ".join(parts)
+    text = "" if parts == ["standing"] else ", ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

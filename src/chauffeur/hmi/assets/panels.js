@@ -212,7 +212,7 @@ function makeInstruments() {
       const left = Math.max(trip.duration - drive.time[index], 0);
       told.push(set('To go', `${drive.to_go[index].toFixed(0)} m`, [trip.going_to, drive.arrives && clock(left)].filter(Boolean).join(' · ')));
     } else {
-      told.push(set('Lane', drive.lane[index].replace(/^lane /, '') || 'intersection', drive.lane[index].startsWith('lane') ? 'from the left' : ''));
+      told.push(set('Lane', drive.lane[index].replace(/^lane /, '') || 'intersection', /of [2-9]/.test(drive.lane[index]) ? 'from the left' : ''));
     }
     const a = drive.acceleration[index];
     const turn = drive.turn[index];
