@@ -64,6 +64,7 @@ _ENDED: Final[dict[Outcome, str]] = {
     "timeout": "time or road ran out",
 }
 """Ends of a drive that its parts do not tell."""
+_NOT_DONE: Final[frozenset[Outcome]] = frozenset({"failure", "timeout", "not_driven"})
 _SAID_BACK: Final[dict[Result, str]] = {
     Result.DONE: "I answered",
     Result.ASKED_BACK: "I asked back",
@@ -147,13 +148,14 @@ def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
     """
     result = result_of(trip)
     tone, label = RESULT_TONES[result], str(result).capitalize()
-    if result is Result.DONE and trip.outcome in ("ended", "refused"):
+    compared = result is not Result.DONE or trip.outcome not in ("ended", "refused")
+    if not compared:
         label, tone = label if trip.outcome == "refused" else f"{label}, not compared", "neutral"
     if timed and trip.duration_s:
         label = f"{label} after {trip.duration_s:.0f} s"
     if tone != "bad" and unexplained(trip.verdicts):
         return MARKS["differs"], f"{label}, not as explained", "neutral"
-    sign = MARKS["not_compared"] if trip.outcome == "ended" and result is Result.DONE else _SIGNS[result]
+    sign = _SIGNS[result] if compared else MARKS["not_compared"]
     return sign, label, tone
 
 
@@ -176,6 +178,7 @@ def _account(trip: Trip) -> Iterator[str]:
         yield "done: all of it" if len(parts) > 1 else "done"
     else:
         yield f"done: {', '.join(done)}" if done else ""
+        yield "not done" if not parts and trip.outcome in _NOT_DONE else ""
         yield f"not done: {why}" if (why := _short(parts, "not_done", "opposite")) else ""
     yield _ENDED.get(trip.outcome, "")
     yield f"not compared: {why}" if (why := _short(parts, "not_judged")) else ""
