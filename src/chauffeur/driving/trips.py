@@ -110,7 +110,7 @@ def file_trip(
         said=said,
         record=(*_provenance(plan, scenario, seed, request.limits, engine), *facts),
         unused=() if outcome in ("refused", "not_driven") else unused_of(request.instruction.text, plan),
-        parts_done=None if episode is None else episode.parts_done,
+        parts=() if episode is None else episode.parts,
         judged_by="" if episode is None else episode.judged_by,
     )
 
