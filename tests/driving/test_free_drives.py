@@ -8,7 +8,6 @@ from functools import cache
 
 import pytest
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.cli.parts import planner_named
 from chauffeur.concept import (
     Instruction,
@@ -23,6 +22,7 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.driving.again import drive_again
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.judge.setpoints import GAP_M, SPEED_MPS
 from chauffeur.driving.judge.trace import HELD_S
 from chauffeur.driving.recording import RecordedTrip

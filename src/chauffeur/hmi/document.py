@@ -17,9 +17,10 @@ def fill(template: str, values: Mapping[str, str]) -> str:
     return _SLOT.sub(lambda match: values[match.group(1)], template)
 
 
-def asset(name: str) -> str:
-    """Text of a file of `hmi/assets`; of a module, without the `export` that a script of one piece cannot have."""
-    text = resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+def asset(name: str, package: str = "chauffeur.hmi") -> str:
+    """Text of a file in the folder `assets` of a package; of a module, without the `export` that a script of one piece
+    cannot have."""
+    text = resources.files(package).joinpath("assets", name).read_text(encoding="utf-8")
     return _EXPORT.sub("", text) if name.endswith(".js") else text
 
 

@@ -9,7 +9,8 @@
           `to` marks the destination among the places; `way` the lanes that lead there; `goal` is a destination that is
           no place, or far away; `ghost` where the car will stand; `wash` the lane it wants.
    body   {x, y, h, l, w, k, paint, crashed, braking, meant: words}; `meant` names the road user that the words meant.
-   view   {x, y: what stands in the middle of the picture, scale: px a metre, turn: rad, middle: [px, px], box: px}. */
+   view   {x, y: what stands in the middle of the picture, scale: px a metre, turn: rad, middle: [px, px],
+          box: [left, top, width, height], taken: [[left, top, right, bottom]]} in px; no words go where `taken` is. */
 
 const SCENE_COLOURS = ['ground', 'ground-ink', 'tuft', 'verge', 'asphalt', 'asphalt-edge', 'mark', 'centre', 'hatch', 'car', 'car-edge',
   'ego-fill', 'ego-edge', 'ring', 'label-back', 'label-ink', 'thing', 'thing-edge', 'crash', 'way', 'sans'];
@@ -286,7 +287,7 @@ export function makeDrawer(canvas) {
     if (sign.n) write(sign.n, x, y + 0.5, { size: radius * (sign.k === 'stop' ? 0.62 : 0.95), weight: 700, fill: sign.k === 'stop' ? '#ffffff' : '#1c1f24' });
   }
 
-  /* A street's name along it, never upside down, where it covers no other words. */
+  /* A street's name along it, never upside down; what drives there covers it. */
   function drawName({ n, x, y, h }) {
     const [px, py] = toScreen(x, y);
     ctx.font = `500 ${LETTERS}px ${colour.sans}`;
@@ -297,7 +298,6 @@ export function makeDrawer(canvas) {
     const plate = [px - across, py - down, px + across, py + down];
     const [bx, by, bw, bh] = view.box;
     if (!free(plate) || plate[2] < bx || plate[0] > bx + bw || plate[3] < by || plate[1] > by + bh) return;
-    plates.push(plate);
     ctx.save();
     ctx.translate(px, py);
     ctx.rotate(upright);
@@ -309,7 +309,7 @@ export function makeDrawer(canvas) {
   function drawPlace({ n, x, y, to }) {
     const [bx, by, bw, bh] = view.box;
     const [sx, sy] = toScreen(x, y);
-    const [px, py] = to ? [Math.min(Math.max(sx, bx + 22), bx + bw - 22), Math.min(Math.max(sy, by + 52), by + bh - 60)] : [sx, sy];
+    const [px, py] = to ? [Math.min(Math.max(sx, bx + 22), bx + bw - 22), Math.min(Math.max(sy, by + 66), by + bh - 60)] : [sx, sy];
     const away = px !== sx || py !== sy;
     if (!to) {
       if (px < bx || px > bx + bw || py < by || py > by + bh) return;
@@ -356,9 +356,9 @@ export function makeDrawer(canvas) {
   }
 
   /* One picture; `words` false for one so small that only roads, ways and the car are to be told. */
-  function draw(road, scene, { x, y, scale, turn = 0, middle, box }, words = true) {
+  function draw(road, scene, { x, y, scale, turn = 0, middle, box, taken = [] }, words = true) {
     view = { x, y, scale, turn, middle, box, cos: Math.cos(turn), sin: Math.sin(turn), reach: Math.hypot(box[2], box[3]) / scale };
-    plates = [];
+    plates = [...taken];
     const { ego, bodies = [], places = [], goal, lead } = scene;
     onScreen();
     ctx.save();
@@ -369,8 +369,13 @@ export function makeDrawer(canvas) {
     inWorld();
     drawRoad(road);
     drawWishes(scene);
-    if (words) plates.push(boxOf(ego));
     drawLights(scene.lights);
+    if (words) {
+      plates.push(boxOf(ego));
+      onScreen();
+      for (const name of road.names) drawName(name);
+      inWorld();
+    }
     if (lead) drawLead(scene);
     if (words) for (const body of bodies) drawBody(body, false);
     drawBody(words ? ego : { ...ego, l: atLeast(ego.l, 13), w: atLeast(ego.w, 7) }, true, scene.shield);
@@ -385,7 +390,6 @@ export function makeDrawer(canvas) {
       if (lead && !lead.body.meant) label(lead.words, ...beside(lead.body));
       if (scene.shield) label(`Shield: ${scene.shield}`, box[0] + box[2], box[1] + box[3] - 22);
       for (const place of marked) if (!place.to) drawPlace(place);
-      for (const name of road.names) drawName(name);
     }
     ctx.restore();
     if (!words) {

@@ -5,16 +5,25 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncGenerator, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from chauffeur.concept import Lane, RoadGraph
+from chauffeur.concept.units import SpeedUnit
 from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, as_json, draw_road, flat
 from chauffeur.hmi.view import mirrored
+from chauffeur.hmi.words import pace_of, passenger_units
 
 _MARGIN_M = 20.0
 _ON_FOOT = ("sidewalk", "crossing")
+
+
+def in_unit(told: Conversation, unit: SpeedUnit) -> Conversation:
+    """A conversation with the speeds that the car speaks of in the person's unit, whole."""
+    why, thoughts = (passenger_units(text, unit) for text in (told.why, told.thoughts))
+    return replace(told, why=why, thoughts=thoughts, said=tuple(passenger_units(text, unit) for text in told.said))
 
 
 def drawn(road: Road) -> dict[str, Any]:
@@ -109,6 +118,7 @@ class LatestMessages:
     def __init__(self) -> None:
         self._kept: dict[str, str] = {}
         self._conversations: dict[str, str] = {}
+        self._unit: SpeedUnit = "km/h"
 
     def write(self, said: Said) -> tuple[str, str]:
         """Keep what will still hold when another screen joins.
@@ -116,7 +126,16 @@ class LatestMessages:
         Returns:
             The message as JSON, and its key for `Outbox.put`; empty where each one counts.
         """
-        text = json.dumps(drawn(said)) if isinstance(said, Road) else encode(said).decode()
+        match said:
+            case Road():
+                text = json.dumps(drawn(said))
+            case Conversation():
+                self._unit = pace_of(said.text, self._unit)
+                text = json.dumps(json.loads(encode(in_unit(said, self._unit))) | {"unit": self._unit})
+            case Note():
+                text = encode(replace(said, text=passenger_units(said.text, self._unit))).decode()
+            case _:
+                text = encode(said).decode()
         match said:
             case Conversation(wish=wish):
                 key = f"conversation {wish}"

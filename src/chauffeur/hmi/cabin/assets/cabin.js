@@ -13,6 +13,12 @@ const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
 const hint = () => (speaks() ? 'Hold the button and say what you want, or type it.' : ['Type what you want.', whyMute()].filter(Boolean).join(' '));
 
+/* What one may do, while there is nothing to tell. */
+function showHint(words = hint()) {
+  $('heard').className = 'heard idle';
+  write($('heard-words'), words);
+}
+
 const road = makeScene($('road'));
 const conversation = makeConversation();
 const memory = makeMemory({ order: (fields) => say('memory_order', fields) });
@@ -43,7 +49,7 @@ const does = {
   seat_view(told) { showSeat(told); },
   listening(told) { listening = told; showHeard(); },
   heard(told) { showHeardWords(told); },
-  conversation(told) { speakIn(told.text); conversation.told(told); },
+  conversation(told) { speakIn(told.unit); conversation.told(told); },
   how_was_it(told) { conversation.askFor(told); },
   memory(told) { memory.told(told); },
   note(told) { conversation.note(told); },
@@ -151,7 +157,7 @@ function showSession() {
     ['Listens with', engine], ['Person', session.person || 'nobody’s memory is used'], ['Control periods', `${Math.round(1 / session.dt_s)} a second`], ['Missed periods', '–'],
   ];
   $('session').replaceChildren(...pairs.flatMap(([name, value]) => [make('dt', { text: name }), make('dd', { text: String(value), id: name === 'Missed periods' ? 'missed' : null })]));
-  if (!talking && !question) write($('heard-words'), hint());
+  if (!talking && !question) showHint();
   if (!session.person) memory.told({ person: '', private: false, retention_days: null, count: 0, newest: [] });
   showMicrophone(false);
 }
@@ -214,10 +220,9 @@ function showHeard() {
     $('heard').className = 'heard busy';
     write($('heard-words'), words);
   } else if (!talking && $('heard').className === 'heard busy') {
-    $('heard').className = 'heard';
-    write($('heard-words'), hint());
+    showHint();
   }
-  if (!question && !talking && (listening.why || !speaks())) write($('heard-words'), speaks() ? listening.why : hint());
+  if (!question && !talking && (listening.why || !speaks())) showHint(speaks() ? listening.why : hint());
 }
 
 /* Speaking. */

@@ -4,10 +4,7 @@
 let unit = 'km/h';
 const OF = { 'km/h': 3.6, mph: 2.23694 };
 export const unitNow = () => unit;
-export function speakIn(words) {
-  if (/\b(mph|miles? (per|an) hour)\b/i.test(words)) unit = 'mph';
-  else if (/\b(km\/?h|kph|kilomet(er|re)s? (per|an) hour)\b/i.test(words)) unit = 'km/h';
-}
+export const speakIn = (told) => { unit = told; };
 export const whole = (mps) => Math.round(Math.abs(mps) * OF[unit]);
 export const atMost = (mps) => Math.floor(mps * OF[unit] + 0.05);
 export const pace = (mps) => `${whole(mps)} ${unit}`;

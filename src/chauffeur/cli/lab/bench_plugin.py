@@ -18,8 +18,8 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, 
 import typer
 from typer.core import TyperGroup
 
-from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.cli.examples import help_text_or_none
+from chauffeur.cli.lab.bench_run import carry_out, effort, finish, show_tables
 from chauffeur.cli.options import (
     BaseUrl,
     Concurrency,
@@ -30,6 +30,7 @@ from chauffeur.cli.options import (
     ShardPart,
     Workers,
 )
+from chauffeur.cli.parts import planner_options
 from chauffeur.concept import ConfigError
 from chauffeur.concept.registry import load_plugin, plugin_names
 

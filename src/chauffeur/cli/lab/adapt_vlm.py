@@ -23,8 +23,8 @@ def adapt_vlm(
 ) -> None:
     """Fine-tune an open vision-language model by LoRA to answer a picture and a wish with gains."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
 
     needs("models", "Adapting", "torch", "transformers", "peft", "safetensors")
     from chauffeur.models.vlm.lora import ChatExamples, LoraRecipe, fine_tune_vlm

@@ -22,8 +22,8 @@ def quantise_vlm(
     from statistics import fmean
 
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError
 
     needs("models", "Quantising", "torch", "transformers", "safetensors")

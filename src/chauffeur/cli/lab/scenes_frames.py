@@ -53,8 +53,8 @@ def frames(
     from chauffeur.bench.openloop.extrapolation import FUTURE_KINDS
     from chauffeur.bench.openloop.frames import SIMULATED, FramesConfig, make_frames
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.scenes import progress
-    from chauffeur.cli.tables import show_table
+    from chauffeur.cli.lab.scenes import progress
+    from chauffeur.cli.lab.tables import show_table
 
     console = stdout()
     config = FramesConfig(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.bench_plugin import BenchGroup
-from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.cli.examples import help_text
+from chauffeur.cli.lab.bench_plugin import BenchGroup
+from chauffeur.cli.lab.bench_run import carry_out, effort, finish, show_tables
 from chauffeur.cli.options import (
     BaseUrl,
     Concurrency,
@@ -21,6 +21,7 @@ from chauffeur.cli.options import (
     ShardPart,
     Workers,
 )
+from chauffeur.cli.parts import planner_options
 from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:

@@ -41,8 +41,8 @@ def onboard(
 ) -> None:
     """The on-board language model: words to driving programs, offline."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
     from chauffeur.models.onboard.pipeline import PipelinePlan, build_data, train_model
 
     if not data_only:  # half an hour of data first, and then nothing to train with, helps nobody
@@ -87,7 +87,7 @@ def sorters(
 ) -> None:
     """The sorters of what passengers hint at, say of the weather, and remark after a drive."""
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.stages import stage_lines
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.models.sorting.pipeline import make_sorters
     from chauffeur.models.sorting.training import SortingRecipe
 
@@ -134,8 +134,8 @@ def vilad_drive(
 
 def _train_vilad(name: str, out: Path, seed: int, steps: int, size: str, mode: str, base: Path | None) -> None:
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
 
     needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")
     from chauffeur.models.vilad.pipeline import MODELS, make_model, recipe_of
@@ -171,9 +171,9 @@ def vilad_frames(
     from dataclasses import replace
 
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
+    from chauffeur.cli.lab.tables import show_table
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
-    from chauffeur.cli.tables import show_table
 
     needs("models", "Training", "torch", "transformers", "safetensors")
     from chauffeur.models.vilad.frames_pipeline import FIGURES_HEAD, FramesPlan, cells_of, make_frames_model
@@ -216,8 +216,8 @@ def bev_llm(
 
     from chauffeur.bench.nuplanqa.questions import SUBTASKS
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.tables import show_table
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.tables import show_table
     from chauffeur.concept import ConfigError
 
     needs("models", "Training", "torch", "transformers", "safetensors")
@@ -266,8 +266,8 @@ def vlm(
 ) -> None:
     """The on-board VLM: a picture and a wish to the scene in words and the controllers' gains (paper Sec. VI)."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.stages import stage_lines
     from chauffeur.cli.parts import needs
-    from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError
 
     needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")

@@ -21,16 +21,6 @@ UNFINISHED: Final = 3
 """Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
 
 
-def planner_options(spec: str, base_url: str | None) -> dict[str, Any]:
-    """Options of a planner in a benchmark.
-
-    A language model is asked whole replies, which cost less to read than pieces nobody looks at, and does not try again
-    by itself: the run does, which sees what all calls meet.
-    """
-    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    return options | {"attempts": 1, "stream": False} if spec.startswith("openai/") else options
-
-
 def effort(
     workers: int | None,
     concurrency: int = 16,
@@ -73,7 +63,7 @@ def carry_out(console: Console, run: BenchRun, work: Callable[[Any], list[Row]],
         work: Does it, given who watches.
         title: What it is called.
     """
-    from chauffeur.cli.bench_progress import shown
+    from chauffeur.cli.lab.bench_progress import shown
 
     shard = run.manifest.shard
     part = f", shard {shard}" if shard.count > 1 else ""
@@ -96,7 +86,7 @@ def carry_out(console: Console, run: BenchRun, work: Callable[[Any], list[Row]],
 def show_tables(console: Console, found: Iterable[ResultTable]) -> None:
     """The kernel's tables."""
     from chauffeur.cli.console import plain
-    from chauffeur.cli.tables import show_table
+    from chauffeur.cli.lab.tables import show_table
 
     for table in found:
         show_table(

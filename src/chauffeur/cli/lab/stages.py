@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from chauffeur.cli.bench_progress import LINE_EVERY_S
+from chauffeur.cli.lab.bench_progress import LINE_EVERY_S
 
 if TYPE_CHECKING:
     from rich.console import Console
