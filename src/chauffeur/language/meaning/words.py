@@ -52,8 +52,8 @@ def act_words(act: Act) -> str:
         parts.append(f"at the next {where.removeprefix('the ')}" if rel == "next" else f"{rel} {where}")
     if act.manner is not None:
         parts.append(_MANNERS[act.manner])
-    if act.style is not None and (how := _STYLES[act.style]) not in parts[1]:
-        parts.append(_WHY_SO.get(act.style, how))
+    if act.style is not None and _STYLES[act.style] not in parts[1]:
+        parts.append(_WHY_SO.get(act.style, _STYLES[act.style]))
     if act.when is not None:
         parts.append(f"— {condition_words(act.when)}")
     if act.purpose:
