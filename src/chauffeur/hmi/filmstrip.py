@@ -52,6 +52,7 @@ _RANK: dict[EventKind, int] = {
     "stopped": 5,
     "said": 6,
     "finished": 7,
+    "drove_on": 8,
 }
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont

@@ -19,7 +19,8 @@ function makeStage() {
       const scale = width / Math.min(170, Math.max(90, width / 7.5));
       size = { width, scale, height: (y1 - y0) * scale + CAPTION_PX + POSTS_PX };
     } else {
-      const height = Math.min(640, Math.max(320, width * 0.62));
+      // On a small screen, or in a notebook's frame, time line and instruments stay in sight below it.
+      const height = Math.min(640, Math.max(300, Math.min(width * 0.62, window.innerHeight * 0.5)));
       const fits = Math.min(width / (x1 - x0), height / (y1 - y0));
       whole = fits >= FOLLOWED_PX;
       size = { width, height, scale: whole ? fits : Math.max(FOLLOWED_PX, width / 110) };
