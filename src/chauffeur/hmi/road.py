@@ -154,6 +154,11 @@ class Bounds:
         x, y = points[:, 0], points[:, 1]
         return (x >= self.x0) & (x <= self.x1) & (y >= self.y0) & (y <= self.y1)
 
+    def meets(self, points: Points) -> bool:
+        """True if the box round a line touches this one."""
+        xs, ys = zip(*points, strict=True)
+        return min(xs) <= self.x1 and max(xs) >= self.x0 and min(ys) <= self.y1 and max(ys) >= self.y0
+
 
 def track_box(track: Points) -> Bounds:
     """Bounding box of a path."""
@@ -172,7 +177,11 @@ def draw_road(
         visible: Part of the world that can be seen, in m.
         signs: Signs that a map knows, in the frame of the road.
     """
-    paved = [(lane, _resample(lane.centre.points_m)) for lane in road.lanes if lane.kind not in _ON_FOOT]
+    paved = [
+        (lane, _resample(lane.centre.points_m))
+        for lane in road.lanes
+        if lane.kind not in _ON_FOOT and visible.meets(lane.centre.points_m)
+    ]
     surfaces = tuple(
         Surface(lane.id, _lapped(_simplify(centre[part]), lane), lane.width_m, _look_of(lane))
         for lane, centre in sorted(paved, key=lambda pair: _ORDER.index(pair[0].kind))

@@ -159,24 +159,24 @@ def style_of_looks() -> str:
 
 
 def _element(shape: Shape) -> str:
-    (x, y), look = shape.points[0], shape.look
+    x, y = shape.points[0]
     points = " ".join(f"{px:.1f},{py:.1f}" for px, py in shape.points)
+    look = f'class="r-{shape.kind}" color="{shape.paint}"' if shape.paint else f'class="r-{shape.kind} r-{shape.look}"'
     match shape.kind:
         case "line":
             dashes = ' stroke-dasharray="3 6"' if shape.dashed else ""
-            return f'<polyline class="r-line r-{look}" stroke-width="{shape.width:.2f}"{dashes} points="{points}"/>'
+            return f'<polyline {look} stroke-width="{shape.width:.2f}"{dashes} points="{points}"/>'
         case "area":
-            return f'<polygon class="r-area r-{look}" points="{points}"/>'
+            return f'<polygon {look} points="{points}"/>'
         case "dot":
-            fill = f' fill="{shape.paint}"' if shape.paint else ""
-            return f'<circle class="r-dot r-{look}" cx="{x:.1f}" cy="{y:.1f}" r="{shape.width:.2f}"{fill}/>'
+            return f'<circle {look} cx="{x:.1f}" cy="{y:.1f}" r="{shape.width:.2f}"/>'
         case "text":
             turn = math.degrees(shape.heading_rad)
             place = f"translate({x:.1f} {y:.1f})" + (f" rotate({turn:.0f})" if turn else "")
             anchor = "start" if shape.start else "middle"
             scale = f"{place} scale({shape.width:.2f})"
             return (
-                f'<text class="r-text r-{look}" transform="{scale}" text-anchor="{anchor}" dominant-baseline="central">'
+                f'<text {look} transform="{scale}" text-anchor="{anchor}" dominant-baseline="central">'
                 f"{html.escape(shape.text)}</text>"
             )
         case "car":
