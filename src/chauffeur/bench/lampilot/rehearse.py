@@ -20,8 +20,8 @@ from chauffeur.bench.lampilot.metrics import (
     points,
 )
 from chauffeur.bench.lampilot.referee import GoalJudge
+from chauffeur.bench.lampilot.rehearsal import RehearsedChoice, rehearse
 from chauffeur.concept import Scenario
-from chauffeur.driving.rehearsal import RehearsedChoice, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception
