@@ -30,6 +30,7 @@ from chauffeur.cli import (
     talk,
     train,
     unmasking,
+    view,
 )
 from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
@@ -121,6 +122,7 @@ app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
 app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK)(replay.replay)
+app.command(epilog=view.EXAMPLES, rich_help_panel=LOOK)(view.view)
 app.command(epilog=report.EXAMPLES, rich_help_panel=LOOK)(report.report)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
 app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK)(doctor.doctor)

@@ -37,8 +37,7 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
 def render_page(recorded: RecordedTrip) -> str:
     """The page of a trip as text."""
     payload = page_payload(recorded)
-    style = "\n".join(asset(name) for name in _STYLES)
-    script = "(() => {\n'use strict';\n" + "\n".join(asset(name) for name in _SCRIPTS) + "\n})();"
+    style, script = page_assets()
     policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
     return fill(
         asset("trip.html"),
@@ -53,6 +52,12 @@ def render_page(recorded: RecordedTrip) -> str:
             "data": embed_json(payload),
         },
     )
+
+
+def page_assets() -> tuple[str, str]:
+    """Style and script of every trip's page."""
+    script = "\n".join(asset(name) for name in _SCRIPTS)
+    return "\n".join(asset(name) for name in _STYLES), f"(() => {{\n'use strict';\n{script}\n}})();"
 
 
 def embed_json(value: Any) -> str:

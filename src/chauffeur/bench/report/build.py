@@ -70,7 +70,11 @@ def read_runs(folders: Sequence[Path], metrics: str = "") -> tuple[Sequence[Run]
     return runs, kind
 
 
-def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) -> BenchReport:
+def _untold(what: str, done: int, total: int) -> None:
+    """Progress that nobody follows."""
+
+
+def build_report(folders: Sequence[Path], choices: Choices, progress: Progress = _untold) -> BenchReport:
     """Read runs and say what came of them.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +67,10 @@ class FlipList:
     left_out: int
 
 
+ShownDrive = tuple[RecordedTrip | None, str]
+"""A drive and what is to be said of it; no drive, and why."""
+
+
 @dataclass(frozen=True, slots=True)
 class Card:
     """A row that is not as it should be, with what its run kept to understand why.
@@ -83,8 +87,9 @@ class Card:
         thoughts: R; empty where there is none.
         program: P; None for baselines, refusals and answers in words.
         verdicts: What the checks said.
-        drive: The drive, driven again with recording; None where there is none to show.
-        drive_note: Why there is none, or what is to be said of it.
+        drive: Gives the drive, e.g. by driving it again with recording, and what is to be said of it; None where there
+            is none to show.
+        drive_note: Why there is none.
         elsewhere: How other runs fared with the same item, as (run, words).
     """
 
@@ -99,7 +104,7 @@ class Card:
     thoughts: str = ""
     program: Program | None = None
     verdicts: tuple[Verdict, ...] = ()
-    drive: RecordedTrip | None = None
+    drive: Callable[[], ShownDrive] | None = None
     drive_note: str = ""
     elsewhere: tuple[tuple[str, str], ...] = ()
 
