@@ -34,8 +34,8 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
     return publish(path, render_page(recorded).encode(), "page")
 
 
-def render_page(recorded: RecordedTrip) -> str:
-    """The page of a trip as text."""
+def render_page(recorded: RecordedTrip, *, embedded: bool = False) -> str:
+    """The page of a trip as text; an `embedded` one leaves out what the page around it says: the wish, the brand."""
     payload = page_payload(recorded)
     style, script = page_assets()
     policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
@@ -47,6 +47,7 @@ def render_page(recorded: RecordedTrip) -> str:
             "wish": html.escape(printable(payload["wish"])),
             "outcome": html.escape(payload["outcome"]["label"]),
             "simulated": html.escape(payload["simulated"]),
+            "look": "embedded" if embedded else "",
             "style": style,
             "script": script,
             "data": embed_json(payload),

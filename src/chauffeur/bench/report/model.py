@@ -20,7 +20,9 @@ def said(name: str, labels: tuple[str, ...]) -> str:
 
 
 _ASKED = ("command", "wish", "instruction", "text", "words", "question")
-_ENDED = ("outcome", "status", "answer", "topic", "chosen")
+_ENDED = ("outcome", "status", "answer", "topic", "chosen", "label")
+_RESULTS = {"success": "done", "failure": "not done", "refused": "declined"}
+"""Stored outcomes that have another word where people read."""
 _SHORT = 80
 """Longest text that is a fact and no prose."""
 
@@ -30,10 +32,10 @@ def asked_words(row: Mapping[str, Any]) -> str:
     return next((str(row[name]) for name in _ASKED if row.get(name)), str(row["item"]))
 
 
-def ending_words(row: Mapping[str, Any]) -> str:
-    """Short words for a row's ending."""
+def ending_words(row: Mapping[str, Any], otherwise: str = "not as it should be") -> str:
+    """Short words for a row's ending; `otherwise` where the row tells none."""
     found = (str(row[name]) for name in _ENDED if row.get(name))
-    return next((text.replace("_", " ") for text in found if len(text) <= _SHORT), "not as it should be")
+    return next((_RESULTS.get(text, text.replace("_", " ")) for text in found if len(text) <= _SHORT), otherwise)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from chauffeur.bench.kernel.benchmark import GROUP
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.stages import LIVE
 from chauffeur.bench.kernel.store import Row, is_written, unseal
-from chauffeur.concept import ConfigError, DataError
+from chauffeur.concept import ChauffeurError, ConfigError, DataError
 from chauffeur.concept.data import parse_json
 from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.planners.transcript import Turn
@@ -114,14 +114,23 @@ class Run:
 
 def benchmark_kind(bench: str) -> Any:
     """The class of the benchmark with an id, out of those that are installed; None where it is not (any more)."""
-    names = sorted((name for name in plugin_names(GROUP) if bench.startswith(name)), key=len, reverse=True)
-    for name in names:
-        found: Any = load_plugin(GROUP, name)
+    # Most ids begin with the name that the benchmark is registered under; only for the others are all imported.
+    for name in sorted(plugin_names(GROUP), key=lambda name: (not bench.startswith(name), -len(name))):
+        try:
+            found: Any = load_plugin(GROUP, name)
+        except ChauffeurError:
+            continue  # a package that cannot be imported is none of this run's
         kind: Any = found if isinstance(found, type) else get_type_hints(found).get("return")
         for one in (kind, *getattr(kind, "__subclasses__", tuple)()):
             if getattr(one, "id", "") == bench:
                 return one
     return None
+
+
+def simulated(kind: Any) -> bool:
+    """True if the figures of a class of benchmarks are results of drives; one that drives nothing says `drives = False`
+    or asks for words."""
+    return bool(getattr(kind, "drives", getattr(kind, "asks", "") != "words"))
 
 
 def specs_of(kind: Any) -> tuple[TableSpec, ...]:

@@ -18,12 +18,12 @@ from chauffeur.bench.kernel.metrics import AnyRow, TableSpec, missed
 from chauffeur.bench.report.build import Choices, HasRulers, build_report
 from chauffeur.bench.report.gallery import MakeCard, ShowsItems, choose, plain_card
 from chauffeur.bench.report.model import BenchReport, Card, ShownDrive, asked_words, ending_words
-from chauffeur.bench.report.runs import Run, benchmark_kind, keyed, specs_of
+from chauffeur.bench.report.runs import Run, benchmark_kind, keyed, simulated, specs_of
 from chauffeur.concept import ChauffeurError, DataError
 from chauffeur.driving.recording import read_trip
 from chauffeur.hmi.page import render_page
 from chauffeur.hmi.payload import program_tokens
-from chauffeur.hmi.viewer.shelf import Shelf, stamp_of
+from chauffeur.hmi.viewer.shelf import Shelf, judge_of, stamp_of
 from chauffeur.hmi.viewer.tables import INTERVALS, table_json
 
 Json = dict[str, Any]
@@ -63,16 +63,18 @@ class Content:
         Raises:
             ConfigError, DataError: See build_report.
         """
-        names = runs.split("+")
         with self._lock:
-            folders = [self.shelf.folder(name) for name in names]
+            folders = [self.shelf.folder(name) for name in runs.split("+")]
         stamps = [stamp_of(folder) for folder in folders]
-        return self._once(f"report {runs}", stamps, lambda: self._report(names, folders))
+        return self._once(f"report {runs}", stamps, lambda: self._report(folders))
 
-    def _report(self, names: Sequence[str], folders: Sequence[Path]) -> Json:
+    def matches(self, runs: str) -> list[list[int]]:
+        """Places of the rows that several runs share, in the first run's order. Raises DataError: see load_run."""
+        return _matches([self._run(name) for name in runs.split("+")])
+
+    def _report(self, folders: Sequence[Path]) -> Json:
         made = build_report(folders, Choices(self.metrics, self.data, gallery=0))
-        runs = [self._run(name) for name in names]
-        return report_json(made) | {"matches": _matches(runs)}
+        return report_json(made)
 
     def rows(self, name: str) -> Json:
         """The rows of a run, in columns that the page lists, filters and sorts.
@@ -194,6 +196,7 @@ def _judged(run: Run) -> tuple[TableSpec | None, str]:
 
 def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
     """Rows with what every benchmark's have: words, ending, group, causes; and their own columns."""
+    kind = benchmark_kind(run.bench)
     spec, group = _judged(run)
     names = list(dict.fromkeys(name for row in run.rows for name in row if name not in _CONSTANT))
     shown: list[Json] = []
@@ -204,7 +207,7 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
             {
                 "item": str(row["item"]),
                 "words": _cut(asked_words(row)),
-                "ending": ending_words(row),
+                "ending": ending_words(row, _judged_words(wrong)),
                 "wrong": wrong,
                 "group": str(row.get(group, "")).replace("_", " "),
                 "causes": _causes(row),
@@ -219,10 +222,17 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
         "state": run.state,
         "done": run.done,
         "planned": run.planned,
+        "ruler": run.ruler,
+        "simulated": simulated(kind),
+        "judge": judge_of(run, kind),
         "group": group.replace("_", " "),
         "columns": names,
         "rows": shown,
     }
+
+
+def _judged_words(wrong: bool | None) -> str:
+    return "" if wrong is None else "not as it should be" if wrong else "as it should be"
 
 
 def _causes(row: AnyRow) -> list[str]:
@@ -342,4 +352,4 @@ def _drive(card: Card) -> Json:
     if card.drive is None:
         return {"page": "", "note": card.drive_note}
     recorded, note = card.drive()
-    return {"page": "" if recorded is None else render_page(recorded), "note": note}
+    return {"page": "" if recorded is None else render_page(recorded, embedded=True), "note": note}

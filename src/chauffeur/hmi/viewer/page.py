@@ -81,7 +81,9 @@ def write_view(
         ordered = [name for name in runs if name in alike]
         pairs = combinations(ordered, 2) if len(ordered) <= ALL_PAIRS_UP_TO else ()
         for names in {*pairs, tuple(ordered)}:
-            answers[f"report {'+'.join(names)}"] = content.report("+".join(names))
+            key = "+".join(names)
+            answers[f"report {key}"] = content.report(key)
+            packs[f"matches {key}"] = content.matches(key)
     for name in runs:
         chosen = content.chosen(name, each)
         for number, place in enumerate(chosen):

@@ -111,6 +111,7 @@ class Viewer:
         plain: dict[str, Callable[..., Any]] = {
             "index": self._content.index,
             "report": self._content.report,
+            "matches": self._content.matches,
             "rows": self._content.rows,
             "trip": self._content.trip,
         }

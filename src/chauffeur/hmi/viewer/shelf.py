@@ -13,7 +13,7 @@ from chauffeur.bench.kernel.metrics import Measure
 from chauffeur.bench.kernel.report import stored_table, value_text
 from chauffeur.bench.kernel.stages import LIVE
 from chauffeur.bench.kernel.store import is_written
-from chauffeur.bench.report.runs import Run, benchmark_kind, load_run, specs_of
+from chauffeur.bench.report.runs import Run, benchmark_kind, load_run, simulated, specs_of
 from chauffeur.concept import ChauffeurError, DataError
 from chauffeur.driving.recording import read_head
 from chauffeur.hmi import words
@@ -188,31 +188,27 @@ def _trip_line(path: Path) -> Json:
     }
 
 
-def simulated(kind: Any) -> bool:
-    """True if the figures of a class of benchmarks are results of drives."""
-    return getattr(kind, "asks", "") != "words"
-
-
 def judge_of(run: Run, kind: Any) -> str:
     """Who judges a run, and what judge and judged share; empty where the benchmark does not say."""
     return str(getattr(kind, "judge", "") or run.stored.get("judge", ""))
 
 
 def headline(run: Run, kind: Any) -> Json | None:
-    """The figure that stands for a run: of its first table the last with a better direction, over all rows."""
+    """The figure that stands for a run: of the first table that has one the last with a better direction, over all
+    rows."""
     specs = specs_of(kind)
-    if specs:
-        measures = [one for one in specs[0].measures if one.better and one.whole is None]
-        rows = specs[0].about(run.rows)
-        if not measures or not rows:
-            return None
-        found = replace(measures[-1], varies=False).aggregate(rows)
-        return _figure(measures[-1], found.value)
+    for spec in specs:
+        measures = [one for one in spec.measures if one.better and one.whole is None]
+        rows = spec.about(run.rows) if measures else ()
+        if rows:
+            found = replace(measures[-1], varies=False).aggregate(rows)
+            return _figure(spec.title, measures[-1], found.value)
     tables: Sequence[Mapping[str, Any]] = run.stored.get("tables") or ()
-    if not tables or not tables[0].get("lines"):
+    if specs or not tables or not tables[0].get("lines"):
         return None
     table = stored_table(tables[0])
     return {
+        "table": table.spec.title,
         "title": table.spec.measures[-1].title,
         "unit": table.spec.measures[-1].unit,
         "text": value_text(table.lines[-1], -1, table.spec.measures[-1])[0],
@@ -220,6 +216,6 @@ def headline(run: Run, kind: Any) -> Json | None:
     }
 
 
-def _figure(measure: Measure, value: float | None) -> Json:
+def _figure(table: str, measure: Measure, value: float | None) -> Json:
     shown = "n/a" if value is None else f"{value * (100.0 if measure.unit == '%' else 1.0):.{measure.digits}f}"
-    return {"title": measure.title, "unit": measure.unit, "text": shown, "value": value}
+    return {"table": table, "title": measure.title, "unit": measure.unit, "text": shown, "value": value}

@@ -146,6 +146,9 @@ function endingMark(row) {
 /* A list that draws the rows in sight only; `open` is given the number of the chosen one. */
 function rowList(runs, filter, open) {
   const list = make('div', null, 'rows');
+  const head = make('div', null, 'row-head');
+  head.setAttribute('aria-hidden', 'true');
+  head.append(make('span', 'What was asked'), box('span', 'endings', ...runs.map((run) => make('span', runs.length > 1 ? run.name : 'Ending'))), make('span', [runs[0].group, 'causes'].filter(Boolean).join(', ')), make('span', '', 'extra'));
   const inner = make('div', null, 'rows-inner');
   list.append(inner);
   list.tabIndex = 0;
@@ -168,12 +171,12 @@ function rowList(runs, filter, open) {
     node.style.transform = `translateY(${place * height()}px)`;
     const words = make('span', first.words, 'words');
     words.dir = 'auto';
-    const about = [first.group, ...first.causes].filter(Boolean).join(' · ');
+    const about = [first.group === first.ending ? '' : first.group, ...first.causes].filter(Boolean).join(' · ');
     node.append(words, box('span', 'endings', ...entry.rows.map(endingMark)), make('span', about, 'about'));
     if (extra()) {
       const at = runs.map((run) => run.columns.indexOf(extra()));
       const values = entry.rows.map((row, run) => row.cells[at[run]]).map((one) => (typeof one === 'number' ? Number(one.toFixed(4)) : one ?? 'none'));
-      node.append(make('span', `${named(extra())} ${values.join(' | ')}`, 'extra'));
+      node.append(make('span', values.join(' | '), 'extra'));
     }
     node.addEventListener('click', () => open(place));
     return node;
@@ -183,6 +186,12 @@ function rowList(runs, filter, open) {
     const each = height();
     const first = Math.max(0, Math.floor(list.scrollTop / each) - SPARE_ROWS);
     const last = Math.min(shown.length, Math.ceil((list.scrollTop + list.clientHeight) / each) + SPARE_ROWS);
+    for (const node of [list, head]) {
+      node.style.setProperty('--runs', runs.length);
+      node.classList.toggle('more', Boolean(extra()));
+    }
+    head.style.paddingRight = `calc(.75rem + ${list.offsetWidth - list.clientWidth - 1}px)`;
+    head.lastChild.textContent = extra() ? named(extra()) : '';
     inner.style.height = `${shown.length * each}px`;
     inner.replaceChildren(...shown.slice(first, last).map((entry, at) => rowNode(entry, first + at)));
     if (shown.length) list.setAttribute('aria-activedescendant', `row-${active}`);
@@ -211,5 +220,5 @@ function rowList(runs, filter, open) {
   });
   list.addEventListener('scroll', () => requestAnimationFrame(draw));
   new ResizeObserver(() => draw()).observe(list);
-  return { node: list, show: (entries, at) => { shown = entries; move(at); } };
+  return { node: list, head, show: (entries, at) => { shown = entries; move(at); } };
 }

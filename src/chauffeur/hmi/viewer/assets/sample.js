@@ -79,17 +79,18 @@ function pairs(entries) {
 function transcript(sample, others) {
   const told = sample.turns.length > 0;
   const parts = [];
+  if (!sample.drivable && sample.note) sample.why.push(sample.note);
   const facts = [...(sample.goal ? [['wanted', sample.goal]] : []), ...sample.facts, ...sample.cost];
   parts.push(box('section', 'part', ...sample.why.map((sentence) => make('p', sentence, 'why')), facts.length ? pairs(facts) : null));
   if (told) parts.push(...conversation(sample.turns, others));
   else {
     parts.push(words('What it was told of the scene', sample.context));
-    parts.push(words('Asked', sample.words));
+    if (sample.words !== sample.item) parts.push(words('Asked', sample.words));
     parts.push(words('Its reasoning', sample.thoughts, 'reasoning'));
   }
   if (sample.refusal) parts.push(words('It declined', sample.refusal));
   if (sample.error) parts.push(words('No answer', sample.error));
-  if (sample.program.length) parts.push(listing('The program that was driven', sample.program));
+  if (sample.program.length) parts.push(listing('Program', sample.program));
   if (sample.library.length) parts.push(listing('Functions of its policy repository', sample.library));
   parts.push(verdictList(sample));
   if (!told && sample.reply) {
@@ -111,10 +112,7 @@ function framed(page, title) {
 }
 
 async function fillDrive(node, id, place, sample) {
-  if (!sample.drivable) {
-    node.append(make('p', sample.note || 'The run kept no drive of this sample.', 'no-drive'));
-    return;
-  }
+  if (!sample.drivable) return;
   const waiting = make('p', 'The drive is being driven again …', 'no-drive');
   node.append(waiting);
   const drive = await ask(`drive ${id} ${place}`);

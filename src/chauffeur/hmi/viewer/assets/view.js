@@ -57,10 +57,10 @@ function runLine(entry) {
   const name = entry.trouble === undefined ? link(entry.name, `#/runs/${entry.id}`) : make('span', entry.name);
   const head = box('th', null, box('span', 'pick', check, box('span', null, name, ...labels(entry.labels || []), make('small', entry.trouble && entry.state === 'unreadable' ? entry.trouble : entry.where))));
   head.scope = 'row';
-  const figure = entry.headline ? [make('b', entry.headline.text), make('small', `${entry.headline.title} ${entry.headline.unit}`)] : [];
+  const figure = entry.headline ? [make('b', entry.headline.text), make('small', `${entry.headline.title} ${entry.headline.unit}`), make('small', entry.headline.table)] : [];
   const judge = entry.judge ? folded(entry.judge.split(/[.:;,]/)[0].slice(0, 60), make('p', entry.judge)) : null;
   const kind = entry.simulated === undefined ? '' : entry.simulated ? 'simulated drives' : 'answers, nothing drove';
-  return box('tr', null, head, cell('Benchmark', entry.bench || ''), cell('When', make('span', when(entry.when)), stateMark(entry)), cell('Items', progress(entry)), cell('Headline', ...figure), cell('Figures are of', kind), cell('Judge', judge));
+  return box('tr', null, head, cell('Benchmark', entry.bench || ''), cell('When', make('span', when(entry.when)), stateMark(entry)), cell('Items', progress(entry)), cell('Headline', ...figure), cell('Kind', kind), cell('Judge', judge));
 }
 
 function tripLine(entry) {
@@ -113,7 +113,7 @@ function drawIndex() {
   const runs = index.runs.filter(fits).sort(order[memory.sort]);
   const trips = index.trips.filter(fits);
   $('index-lists').replaceChildren(
-    indexTable(`Runs (${runs.length})`, ['Run', 'Benchmark', 'When', 'Items', 'Headline', 'Figures are of', 'Judge'], runs.map(runLine), held ? 'This file holds none.' : `No run below ${index.folders.join(', ')}. Make one: chauffeur bench lampilot --data DbLv1`),
+    indexTable(`Runs (${runs.length})`, ['Run', 'Benchmark', 'When', 'Items', 'Headline', 'Kind', 'Judge'], runs.map(runLine), held ? 'This file holds none.' : `No run below ${index.folders.join(', ')}. Make one: chauffeur bench lampilot --data DbLv1`),
     indexTable(`Trips (${trips.length})`, ['Wish', 'Outcome', 'Planner', 'Road', 'Driven', 'When', 'Kind'], trips.map(tripLine), held ? 'This file holds none.' : 'No recorded trip. Make one: chauffeur drive "Overtake the car ahead" --save trips/overtake'),
   );
   drawChosen();
@@ -153,43 +153,48 @@ async function showIndex(mine) {
 async function viewOf(key) {
   let view = memory.views.get(key);
   if (!view) {
-    const ids = key.split('+');
-    const [report, ...runs] = await Promise.all([ask(`report ${key}`), ...ids.map((id) => ask(`rows ${id}`))]);
-    view = { ids, report, runs };
-    relate(view);
+    view = { key, ids: key.split('+'), report: null };
+    await read(view);
     memory.views.set(key, view);
   }
   if (!memory.filters.has(key)) memory.filters.set(key, { ...NO_FILTER });
   return view;
 }
 
-function relate(view) {
-  // The rows of a single run may be newer than its tables.
-  const matches = view.ids.length === 1 ? view.runs[0].rows.map((_, place) => [place]) : view.report.matches.filter((places) => places.every((place, at) => place < view.runs[at].rows.length));
-  view.entries = entriesOf(view.runs, matches);
+/* Rows come at once; the intervals of the tables take longer. */
+async function read(view) {
+  const [runs, matches] = await Promise.all([Promise.all(view.ids.map((id) => ask(`rows ${id}`))), view.ids.length > 1 ? ask(`matches ${view.key}`) : null]);
+  view.runs = runs;
+  const places = matches || runs[0].rows.map((_, place) => [place]);
+  // A run that goes on may have got rows between the two answers.
+  view.entries = entriesOf(runs, places.filter((mine) => mine.every((place, at) => place < runs[at].rows.length)));
 }
 
 const nameOf = (view) => view.runs.map((run) => run.name).join(' and ');
 
 function runHead(view) {
-  const { report } = view;
-  const state = box('p', 'subtitle', report.subtitle, ...labels(report.labels));
+  const { report, runs } = view;
+  const title = report ? report.title : `${runs[0].bench}: ${runs.map((run) => run.name).join(', ')}`;
+  const items = new Set(view.entries.map((entry) => entry.rows[0].item)).size;
+  const ruler = runs[0].ruler ? `, ruler ${runs[0].ruler}` : '';
+  const state = box('p', 'subtitle', `${plural(items, 'item')}, ${plural(view.entries.length, 'row')}${ruler}. ${runs[0].simulated ? 'Simulated drives; no real car moved.' : 'Answers, judged as they stand; nothing drove.'}`, ...labels([...new Set(runs.flatMap((run) => run.labels))]));
   view.runs.forEach((run) => {
     const done = run.done < run.planned ? `, ${run.done.toLocaleString('en')} of ${run.planned.toLocaleString('en')} items` : '';
     if (run.state !== 'finished') state.append(' ', box('span', `state ${run.state}`, `${view.runs.length > 1 ? `${run.name}: ` : ''}${STATES[run.state]}${done}`));
   });
-  const judge = report.judge ? box('p', 'judge', make('b', 'Judge'), report.judge) : null;
-  const kind = make('p', report.simulated ? 'Simulated drives; no real car moved.' : 'Answers about pictures; nothing drove.', 'sim');
-  return box('section', 'lead', make('h1', report.title), state, kind, judge, ...report.notices.map((text) => make('p', text, 'notice')));
+  const judge = runs[0].judge ? box('p', 'judge', make('b', 'Judge'), runs[0].judge) : null;
+  return box('section', 'lead', make('h1', title), state, judge, ...(report && runs.every((run) => run.state !== 'running') ? report.notices : []).map((text) => make('p', text, 'notice')));
 }
 
 function results(view) {
   const { report } = view;
+  if (!report) return make('p', 'The tables and their intervals are being counted …', 'note');
   const [first, ...others] = report.tables.map((table) => tableCard(table, report.simulated));
   return box('div', 'stack', first || null, ...report.pairs.map((table) => tableCard({ ...table, title: `Run against run. ${table.title}` }, report.simulated)), ...others);
 }
 
 function method(view) {
+  if (!view.report) return make('p', 'The tables and their intervals are being counted …', 'note');
   const facts = view.report.facts.map(({ run, facts: entries }) => box('section', null, make('h3', run), pairs(entries)));
   return box('section', 'card', make('h2', 'How the figures were made'), make('p', view.report.intervals), ...facts);
 }
@@ -224,7 +229,7 @@ function samples(view, key) {
     changed();
     if (view.at) list.show(view.shown, view.at);
   });
-  return box('section', 'card samples', bar, box('div', 'above', count, clear, keys), list.node);
+  return box('section', 'card samples', bar, box('div', 'above', count, clear, keys), list.head, list.node);
 }
 
 const TABS = { results: ['Results', results], samples: ['Samples', samples], method: ['Method', method] };
@@ -268,17 +273,19 @@ async function showRuns(mine, key) {
   $('main').replaceChildren(head, tabs, panel);
   open(memory.tab);
   let tablesAt = performance.now();
+  const count = async () => {
+    tablesAt = performance.now();
+    view.report = await ask(`report ${key}`);
+    if (mine !== turn) return;
+    head.replaceChildren(runHead(view));
+    if (memory.tab !== 'samples') panel.replaceChildren(TABS[memory.tab][1](view, key));
+  };
+  if (!view.report) count().catch(trouble);
   refresh = async (changed) => {
     if (!view.ids.some((id) => changed.has(id))) return;
-    view.runs = await Promise.all(view.ids.map((id) => ask(`rows ${id}`)));
-    const ended = view.runs.every((run) => run.state !== 'running');
-    if (ended || view.ids.length > 1 || performance.now() - tablesAt > TABLES_MS) {
-      view.report = await ask(`report ${key}`);
-      tablesAt = performance.now();
-      if (mine === turn && memory.tab === 'results') panel.replaceChildren(results(view));
-    }
+    await read(view);
+    if (view.runs.every((run) => run.state !== 'running') || performance.now() - tablesAt > TABLES_MS) count().catch(trouble);
     if (mine !== turn) return;
-    relate(view);
     head.replaceChildren(runHead(view));
     tabs.querySelector('[data-tab="samples"]').textContent = `Samples (${view.entries.length.toLocaleString('en')})`;
     if (view.redraw) view.redraw();
@@ -305,7 +312,7 @@ async function showSample(mine, key, placesText) {
   const after = button('Next →', 'plain', () => step(1));
   before.disabled = at <= 0;
   after.disabled = at < 0 || at + 1 >= shown.length;
-  const title = make('h1', found[0].words);
+  const title = make('h1', found[0].words, found[0].words === found[0].item ? 'bare' : '');
   title.dir = 'auto';
   const head = box('section', 'sample-head', title,
     box('div', 'steps', before, after, make('span', at >= 0 ? `${(at + 1).toLocaleString('en')} of ${shown.length.toLocaleString('en')}` : '', 'count'), box('p', 'keys', make('kbd', '←'), make('kbd', '→'), ' sample · ', make('kbd', 'Esc'), ' back')),
@@ -318,7 +325,8 @@ async function showSample(mine, key, placesText) {
     return { words: box('article', 'card said-card', name, verdict, transcript(sample, others)), drive, sample, run };
   });
   const many = columns.length > 1;
-  const layout = box('div', many ? 'beside' : 'sample', ...columns.map(({ words: said, drive }) => (many ? box('div', 'column', said, drive) : said)), ...(many ? [] : [columns[0].drive]));
+  const alone = !many && !columns[0].sample.drivable;
+  const layout = box('div', many ? 'beside' : alone ? 'alone' : 'sample', ...columns.map(({ words: said, drive, sample }) => (many ? box('div', 'column', said, sample.drivable ? drive : null) : said)), many || alone ? null : columns[0].drive);
   $('main').replaceChildren(head, layout);
   window.scrollTo(0, 0);
   memory.tab = 'samples';
