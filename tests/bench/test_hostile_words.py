@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small_run import Inline, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.hostile import (
@@ -34,12 +33,12 @@ from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
-from chauffeur.driving.episode import Episode
-from chauffeur.driving.session import drive_without_program, make_world
+from chauffeur.driving.episode import Episode, drive_without_program, make_world
 from chauffeur.language.letters import clean
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.programs.gate import check_source
 from chauffeur.worlds.highway import HighwayWorld
+from small_run import Inline, quiet
 
 ATTACKS, HARMLESS = hostile_inputs(), lookalikes()
 LIMITS = Limits()

@@ -26,11 +26,11 @@ from viewer_folders import content_of, ids_of, make_folders
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from chauffeur.bench.viewer.content import Content
+from chauffeur.bench.viewer.page import write_view
+from chauffeur.bench.viewer.server import MOST_MESSAGE_BYTES, Viewer
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
-from chauffeur.hmi.viewer.content import Content
-from chauffeur.hmi.viewer.page import write_view
-from chauffeur.hmi.viewer.server import MOST_MESSAGE_BYTES, Viewer
 from report_folders import mixed, outcome, read_lines, write, write_lines, write_run
 from small_run import COMMANDS
 

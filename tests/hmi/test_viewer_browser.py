@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from viewer_folders import content_of, ids_of, make_folders
 
-from chauffeur.hmi.viewer.page import write_view
-from chauffeur.hmi.viewer.server import Viewer
+from chauffeur.bench.viewer.page import write_view
+from chauffeur.bench.viewer.server import Viewer
 from chromium import CHROMIUM, PHONE, Tab, browser
 from small_run import COMMANDS
 

@@ -8,9 +8,9 @@ from sample_trips import highway_trip
 
 from chauffeur.bench.faithfulness.benchmark import FaithfulnessBenchmark
 from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.viewer.content import Content
+from chauffeur.bench.viewer.shelf import Shelf
 from chauffeur.driving.recording import write_trip
-from chauffeur.hmi.viewer.content import Content
-from chauffeur.hmi.viewer.shelf import Shelf
 from small_run import SEEDS, Inline, finish, make_data, make_run, quiet, recorded
 
 

@@ -17,8 +17,12 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.payload import page_payload
 
-_STYLES = ("trip.css", "panels.css")
-_SCRIPTS = ("panels.js", "stage.js", "charts.js", "player.js")
+_STYLES = ("scene.css", "trip.css", "panels.css")
+_SCRIPTS = ("panels.js", "drawer.js", "stage.js", "charts.js", "player.js")
+
+
+_OUTCOME = {"outcome": "label", "sign": "sign", "tone": "tone", "account": "account"}
+"""Slots of the headline, and what fills them."""
 
 
 def write_page(path: Path, recorded: RecordedTrip) -> Path:
@@ -35,7 +39,7 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
 
 
 def render_page(recorded: RecordedTrip, *, embedded: bool = False) -> str:
-    """The page of a trip as text; an `embedded` one leaves out what the page around it says: the wish, the brand."""
+    """The page of a trip as text; an `embedded` one leaves out the name, which the page around it says."""
     payload = page_payload(recorded)
     style, script = page_assets()
     policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
@@ -45,7 +49,7 @@ def render_page(recorded: RecordedTrip, *, embedded: bool = False) -> str:
             "policy": html.escape(policy),
             "title": html.escape(f"“{printable(payload['wish'])}” – {payload['outcome']['label']}"),
             "wish": html.escape(printable(payload["wish"])),
-            "outcome": html.escape(payload["outcome"]["label"]),
+            **{name: html.escape(printable(payload["outcome"][of])) for name, of in _OUTCOME.items()},
             "simulated": html.escape(payload["simulated"]),
             "look": "embedded" if embedded else "",
             "style": style,

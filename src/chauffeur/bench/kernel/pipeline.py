@@ -25,7 +25,7 @@ from chauffeur.bench.kernel.stages import StageStore
 from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context, Scenario
 from chauffeur.describe import describe
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 from chauffeur.planners.transcript import Turn
 
 Watch = Callable[[Standing], None]
