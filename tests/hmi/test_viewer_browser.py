@@ -161,7 +161,7 @@ def test_every_screen_can_be_read(root: Path, tmp_path: Path, size: tuple[int, i
 def test_an_exported_page_works_from_the_disk(root: Path, tmp_path: Path) -> None:
     content = content_of(root / "runs")
     ids = ids_of(content)
-    page = write_view(tmp_path / "page.html", content, [ids["recorded"], ids["mobil"]], [], 12, lambda *told: None)
+    page = write_view(tmp_path / "page.html", content, [ids["recorded"], ids["mobil"]], [], 12)
 
     async def run() -> None:
         async with browser(tmp_path / "profile") as tab:

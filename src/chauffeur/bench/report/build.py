@@ -70,11 +70,11 @@ def read_runs(folders: Sequence[Path], metrics: str = "") -> tuple[Sequence[Run]
     return runs, kind
 
 
-def _untold(what: str, done: int, total: int) -> None:
+def untold(what: str, done: int, total: int) -> None:
     """Progress that nobody follows."""
 
 
-def build_report(folders: Sequence[Path], choices: Choices, progress: Progress = _untold) -> BenchReport:
+def build_report(folders: Sequence[Path], choices: Choices, progress: Progress = untold) -> BenchReport:
     """Read runs and say what came of them.
 
     Raises:

@@ -10,13 +10,13 @@ import base64
 import gzip
 import html
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.report.build import LEAST_PICKED, PICKED_IN_ALL
+from chauffeur.bench.report.build import LEAST_PICKED, PICKED_IN_ALL, Progress, untold
 from chauffeur.bench.report.gallery import PICKED
 from chauffeur.bench.report.pairs import ALL_PAIRS_UP_TO
 from chauffeur.bench.viewer.content import Content
@@ -27,9 +27,6 @@ from chauffeur.hmi.page import embed_json, page_assets
 _STYLES: Final = ("scene.css", "trip.css", "panels.css")
 """Of the trip page, whose look the viewer shares."""
 _SCRIPTS: Final = ("dom", "source", "tables", "list", "sample", "view")
-
-Tell = Callable[[str, int, int], None]
-"""Called as (what, done, of how many)."""
 
 
 def render_view() -> str:
@@ -43,7 +40,12 @@ def inline_sources() -> tuple[str, ...]:
 
 
 def write_view(
-    path: Path, content: Content, runs: Sequence[str], trips: Sequence[str], drives: int | None, tell: Tell
+    path: Path,
+    content: Content,
+    runs: Sequence[str],
+    trips: Sequence[str],
+    drives: int | Sequence[tuple[str, int]] | None,
+    tell: Progress = untold,
 ) -> Path:
     """Write runs and trips as one self-contained file; it appears whole or not at all.
 
@@ -52,8 +54,8 @@ def write_view(
         content: What is shown.
         runs: Ids of runs.
         trips: Ids of trips.
-        drives: Drives of each run that are shown; None shares a page's worth among the runs. Those of rows that are
-            not as they should be, spread over groups and endings.
+        drives: Drives of each run that are shown, of rows that are not as they should be, spread over groups and
+            endings; None shares a page's worth among the runs. Or the very rows, as (run, place).
         tell: Is told how far it is.
 
     Raises:
@@ -69,7 +71,6 @@ def write_view(
             benches.setdefault(str(line.get("bench")), []).append(line["id"])
     for name in ("runs", "trips"):
         answers["index"][name] = [line for line in index[name] if line["id"] in (*runs, *trips)]
-    each = min(PICKED, max(LEAST_PICKED, PICKED_IN_ALL // max(1, len(runs)))) if drives is None else drives
     shown = "+".join(runs) if len(benches) == 1 else ""
     answers["opens"] = "#/" if trips or not shown else f"#/runs/{shown}"
     for number, name in enumerate(runs):
@@ -85,11 +86,13 @@ def write_view(
             key = "+".join(names)
             answers[f"report {key}"] = content.report(key)
             packs[f"matches {key}"] = content.matches(key)
-    for name in runs:
-        chosen = content.chosen(name, each)
-        for number, place in enumerate(chosen):
-            tell("showing drives", number, len(chosen))
-            packs[f"drive {name} {place}"] = content.drive(name, place)
+    if drives is None or isinstance(drives, int):
+        shared = min(PICKED, max(LEAST_PICKED, PICKED_IN_ALL // max(1, len(runs))))
+        each = shared if drives is None else drives
+        drives = [(name, place) for name in runs for place in content.chosen(name, each)]
+    for number, (name, place) in enumerate(drives):
+        tell("showing drives", number, len(drives))
+        packs[f"drive {name} {place}"] = content.drive(name, place)
     for number, name in enumerate(trips):
         tell("reading trips", number, len(trips))
         packs[f"trip {name}"] = content.trip(name)
