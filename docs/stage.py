@@ -1,0 +1,74 @@
+"""Lay out the site's sources under `build/book`: docs/, and the pages that stand elsewhere in the repository.
+
+`make docs` runs it, then zensical. A page stands once: RESULTS, the architecture, the change log and the model cards
+are copied from where they are, and links between them are turned to where they lie on the site. A link to a file that
+is no page of the site becomes plain text.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BOOK = ROOT / "build" / "book"
+ELSEWHERE = {
+    "benchmarks/RESULTS.md": "results.md",
+    "ARCHITECTURE.md": "architecture.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "src/chauffeur/language/meaning/weights/CARD.md": "cards/meaning.md",
+    "src/chauffeur/planners/onboard/weights/MODEL_CARD.md": "cards/onboard.md",
+    "src/chauffeur/planners/onboard/weights/DATA_CARD.md": "cards/onboard-data.md",
+    "src/chauffeur/planners/vlm/weights/MODEL_CARD.md": "cards/vlm.md",
+    "src/chauffeur/planners/vilad/weights/MODEL_CARD.md": "cards/vilad-parking.md",
+    "src/chauffeur/planners/vilad/weights/drive/MODEL_CARD.md": "cards/vilad-drive.md",
+    "src/chauffeur/planners/vilad/weights/frames/MODEL_CARD.md": "cards/vilad-frames.md",
+    "src/chauffeur/models/bev_llm/weights/MODEL_CARD.md": "cards/bev-llm.md",
+    "src/chauffeur/models/sorting/CARD.md": "cards/sorting.md",
+}
+"""Pages outside docs/, and their place on the site."""
+LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\(([^()\s]+)\)")
+FENCE = re.compile(r"^(```.*?^```)", re.MULTILINE | re.DOTALL)
+
+
+def pages() -> dict[Path, Path]:
+    """Every file of the site: where it stands in the repository, and where under `build/book`."""
+    docs = [path for path in (ROOT / "docs").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")]
+    found = {path: BOOK / path.relative_to(ROOT / "docs") for path in docs}
+    return found | {ROOT / source: BOOK / place for source, place in ELSEWHERE.items()}
+
+
+def turned(text: str, source: Path, placed: dict[Path, Path]) -> str:
+    """A page's text with its links as they lead on the site; code is left alone."""
+
+    def turn(match: re.Match[str]) -> str:
+        mark, label, target = match.groups()
+        name, sharp, anchor = target.partition("#")
+        if not name or re.match(r"[a-z]+:", name):
+            return match.group()
+        meant = Path(os.path.normpath(source.parent / name))
+        if meant not in placed:
+            return label
+        here = os.path.relpath(placed[meant], placed[source].parent)
+        return f"{mark}[{label}]({here}{sharp}{anchor})"
+
+    return "".join(part if part.startswith("```") else LINK.sub(turn, part) for part in FENCE.split(text))
+
+
+def stage() -> None:
+    """Write `build/book` anew."""
+    shutil.rmtree(BOOK, ignore_errors=True)
+    placed = pages()
+    for source, place in placed.items():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if source.suffix == ".md":
+            place.write_text(turned(source.read_text(encoding="utf-8"), source, placed), encoding="utf-8")
+        else:
+            shutil.copyfile(source, place)
+
+
+if __name__ == "__main__":
+    stage()
