@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 BOOK = ROOT / "build" / "book"
 ELSEWHERE = {
+    "README.md": "readme.md",
     "benchmarks/RESULTS.md": "results.md",
     "ARCHITECTURE.md": "architecture.md",
     "CHANGELOG.md": "changelog.md",

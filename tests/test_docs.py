@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import re
 import shlex
+import tomllib
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -12,12 +15,15 @@ import click
 import pytest
 import typer.main
 
+import chauffeur
 from chauffeur.cli.main import app
 from chauffeur.planners.onboard.dialect import read
 from chauffeur.programs import check_source
+from pictures import PICTURES
+from stage import BOOK, ELSEWHERE, pages, turned
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCKS = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`(chauffeur [^`\n]+)`")
 
@@ -88,6 +94,16 @@ def test_programs_shown_are_programs() -> None:
     assert shown
 
 
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_blocks_can_be_read(document: Path) -> None:
+    """Python as a cell of a notebook, where `await` may stand at the top; TOML as a file."""
+    for language, block in BLOCKS.findall(document.read_text(encoding="utf-8")):
+        if language == "python":
+            compile(block, document.name, "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT | ast.PyCF_ONLY_AST)
+        elif language == "toml":
+            tomllib.loads(block)
+
+
 def test_at_most_twelve_options_a_panel() -> None:
     """A command with more has to put them under headings in its help."""
 
@@ -138,12 +154,14 @@ def test_the_evidence_of_the_safety_case_is_there() -> None:
 # Links and figures ------------------------------------------------------------------------------------------------
 
 LINK = re.compile(r"\]\(([^()\s]+)\)")
-PAGES = [*DOCUMENTS, ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "RESULTS.md"]
+PAGES = [*DOCUMENTS, *(ROOT / source for source in ELSEWHERE if source not in ("README.md", "CONTRIBUTING.md"))]
 
 
 def _anchors(page: Path) -> set[str]:
+    """Of headings that have the same one on the site as where the repository is shown."""
     titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+    names = (re.sub(r"[^\w\- ]", "", title.lower()).strip() for title in titles)
+    return {name.replace(" ", "-") for name in names if not re.search(r"[- ]{2}", name)}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
@@ -156,15 +174,53 @@ def test_no_link_is_dead(page: Path) -> None:
         found = (page.parent / name).resolve() if name else page
         assert found.exists(), f"{page.name}: {target}"
         assert not anchor or anchor in _anchors(found), f"{page.name}: {target}"
-        # The site is made of docs/ alone: from there, a link leads nowhere else.
-        assert page.parent.name != "docs" or found.is_relative_to(ROOT / "docs"), f"{page.name}: {target}"
+        # The site has the pages that docs/stage.py lays out: from docs/, a link leads nowhere else.
+        assert not page.is_relative_to(ROOT / "docs") or found in pages(), f"{page.name}: {target}"
+
+
+def test_links_lead_to_where_pages_lie_on_the_site() -> None:
+    placed = pages()
+    source = ROOT / "docs" / "tutorials" / "vilad.md"
+    text = (
+        "[a](../vilad.md#figures) [b](../../benchmarks/RESULTS.md) [c](../../pyproject.toml) `x`\n```\n[a](b.md)\n```\n"
+    )
+    assert turned(text, source, placed) == "[a](../vilad.md#figures) [b](../results.md) c `x`\n```\n[a](b.md)\n```\n"
+    for page in (one for one in placed if one.suffix == ".md"):
+        laid = turned(page.read_text(encoding="utf-8"), page, placed)
+        for target in LINK.findall(re.sub(r"^```.*?^```", "", laid, flags=re.MULTILINE | re.DOTALL)):
+            if not re.match(r"[a-z]+:|#", target):
+                meant = (placed[page].parent / target.partition("#")[0]).resolve()
+                assert meant in placed.values(), f"{page.name}: {target}"
 
 
 def test_every_page_is_in_the_menu_and_at_the_start() -> None:
-    menu = set(re.findall(r": ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE))
-    start = set(LINK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8"))) | {"index.md"}
-    pages = {page.name for page in (ROOT / "docs").glob("*.md")}
-    assert menu == pages and start >= pages
+    def named(menu: object) -> list[str]:
+        if isinstance(menu, str):
+            return [menu]
+        parts = menu.values() if isinstance(menu, dict) else menu
+        return [page for part in parts for page in named(part)]  # type: ignore[union-attr]
+
+    menu = named(tomllib.loads((ROOT / "zensical.toml").read_text(encoding="utf-8"))["project"]["nav"])
+    assert len(menu) == len(set(menu))
+    assert set(menu) == {str(place.relative_to(BOOK)) for place in pages().values() if place.suffix == ".md"}
+    start = ROOT / "docs" / "index.md"
+    linked = {(start.parent / target).resolve() for target in LINK.findall(start.read_text(encoding="utf-8"))}
+    assert linked | {start} >= set((ROOT / "docs").rglob("*.md"))
+
+
+def test_every_picture_is_shown_and_made_by_its_script() -> None:
+    made = {name for _, names in PICTURES.values() for name in names}
+    assert made == {path.name for path in (ROOT / "docs" / "images").iterdir()}
+    shown = "".join(page.read_text(encoding="utf-8") for page in DOCUMENTS)
+    assert all(f"images/{name})" in shown for name in made)
+
+
+def test_the_reference_has_all_that_the_package_offers() -> None:
+    text = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    named = re.findall(r"^::: ([\w.]+)\.(\w+)$", text, re.MULTILINE)
+    for module, name in named:
+        assert hasattr(importlib.import_module(module), name), f"{module}.{name}"
+    assert {name for _, name in named} >= set(chauffeur.__all__) - {"__version__"}
 
 
 FIGURES = {
@@ -176,7 +232,10 @@ FIGURES = {
         r"3,136 items: ([\d.]+) % completed, ([\d.]+) % collisions, driving score ([\d.]+)",
         r"development data, 3,136 .*?\| ([\d.]+) / ([\d.]+) / \*\*([\d.]+)\*\*",
     ),
-    "town, expert": (r"expert ([\d.]+), by words", r"\| expert \(`--planner expert [^|]*\| 78 \|[^|]*\|[^|]*\| ([\d.]+) \["),
+    "town, expert": (
+        r"expert ([\d.]+), by words",
+        r"\| expert \(`--planner expert [^|]*\| 78 \|[^|]*\|[^|]*\| ([\d.]+) \[",
+    ),
     "town, words": (r"by words ([\d.]+) of 100", r"\| by words \(`--planner [^|]*\| 78 \|[^|]*\|[^|]*\| ([\d.]+) \["),
     "questions": (
         r"([\d.]+) % of unseen simulated questions, ([\d.]+) % blind",
@@ -215,9 +274,12 @@ FIGURES = {
 def test_figures_of_the_readme_are_those_of_the_results(name: str) -> None:
     shown = "".join((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/install.md"))
     results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
-    (said,), (measured,) = (list(re.finditer(pattern, text)) for pattern, text in zip(FIGURES[name], (shown, results), strict=True))
+    said, (measured,) = (
+        list(re.finditer(pattern, text)) for pattern, text in zip(FIGURES[name], (shown, results), strict=True)
+    )
     by_name = measured.groupdict()
-    assert said.groups() == (tuple(by_name[key] for key in sorted(by_name)) or measured.groups())
+    figures = tuple(by_name[key] for key in sorted(by_name)) or measured.groups()
+    assert said and all(one.groups() == figures for one in said)
 
 
 def test_the_readme_is_one_screen_and_has_one_line_a_system() -> None:

@@ -56,9 +56,8 @@ class Reader:
         patch.setenv("CHAUFFEUR_API_KEY", "none")
 
     def follow(self, page: Path, **instead: str) -> None:
-        """Do every block in order. `text` after another block is what that one prints, or nothing that runs."""
+        """Do every block in order. `output` is what the block before it prints; `text` does not run."""
         text = page.read_text(encoding="utf-8")
-        before = ""
         for _, kind, found in BLOCKS.findall(text):
             block = found
             for old, new in instead.items():
@@ -73,9 +72,8 @@ class Reader:
             elif kind == "sh":
                 for line in block.splitlines():
                     self.line(line)
-            elif kind == "text" and before in ("python", "sh"):
+            elif kind == "output":
                 self.shown(block)
-            before = kind
 
     def cell(self, code: str) -> None:
         """A cell of a notebook: `await` may stand at its top, and its last expression is shown."""
