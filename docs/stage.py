@@ -2,14 +2,17 @@
 
 `make docs` runs it, then zensical. A page stands once: RESULTS, the architecture, the change log and the model cards
 are copied from where they are, and links between them are turned to where they lie on the site. A link to a file that
-is no page of the site becomes plain text.
+is no page of the site becomes plain text. `python docs/stage.py notebooks` writes the tutorials of `NOTEBOOKS` as
+notebooks.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,6 +34,8 @@ ELSEWHERE = {
     "src/chauffeur/models/sorting/CARD.md": "cards/sorting.md",
 }
 """Pages outside docs/, and their place on the site."""
+NOTEBOOKS = ("a-wish", "vilad")
+"""Tutorials that are notebooks as well, in docs/notebooks."""
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\(([^()\s]+)\)")
 FENCE = re.compile(r"^(```.*?^```)", re.MULTILINE | re.DOTALL)
 
@@ -71,5 +76,37 @@ def stage() -> None:
             shutil.copyfile(source, place)
 
 
+def notebook(page: str) -> str:
+    """A tutorial's text as a notebook without outputs: Python as cells, commands as `!` lines, the rest as text."""
+    cells: list[dict[str, object]] = []
+
+    def add(kind: str, text: str) -> None:
+        if not text.strip():
+            return
+        cell: dict[str, object] = {"cell_type": kind, "id": f"cell-{len(cells)}", "metadata": {}}
+        cell["source"] = text.strip().splitlines(keepends=True)
+        cells.append(cell | ({"execution_count": None, "outputs": []} if kind == "code" else {}))
+
+    for part in FENCE.split(page):
+        code = re.fullmatch(r"```(python|sh)\n(.*?)```", part, re.DOTALL)
+        if code is None:
+            add("markdown", part.replace("```output", "```text"))
+        else:
+            shell = "" if code.group(1) == "python" else "!"
+            add("code", "".join(f"{shell}{line}\n" for line in code.group(2).splitlines()))
+    kernel = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+    return json.dumps({"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}, indent=1) + "\n"
+
+
+def tutorial(name: str) -> str:
+    """Text of a tutorial, without the line that leads to its notebook."""
+    page = (ROOT / "docs" / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+    return page.replace(f"[As a notebook](../notebooks/{name}.ipynb).\n\n", "")
+
+
 if __name__ == "__main__":
-    stage()
+    if sys.argv[1:] == ["notebooks"]:
+        for name in NOTEBOOKS:
+            (ROOT / "docs" / "notebooks" / f"{name}.ipynb").write_text(notebook(tutorial(name)), encoding="utf-8")
+    else:
+        stage()

@@ -27,6 +27,7 @@ from typer.testing import CliRunner
 from chauffeur.cli.main import app
 from chauffeur.driving.recording import read_trip
 from chauffeur.programs.catalogue import apis_of, plugged_apis
+from stage import NOTEBOOKS, notebook, tutorial
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -152,6 +153,11 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
     one.close()
 
 
+def needs_training() -> None:
+    for library in ("torch", "onnxscript"):
+        pytest.importorskip(library, reason=f"{library} is not installed: pip install 'chauffeur[models]'")
+
+
 def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as server:
         return server.getsockname()[1]
@@ -185,8 +191,7 @@ def test_a_planner_and_a_driving_call_of_ones_own(reader: Reader, tmp_path: Path
 
 
 def test_vilad_is_trained_and_drives(reader: Reader, tmp_path: Path) -> None:
-    for library in ("torch", "onnxscript"):
-        pytest.importorskip(library, reason=f"{library} is not installed: pip install 'chauffeur[models]'")
+    needs_training()
     reader.follow(DOCS / "tutorials" / "vilad.md")
     assert reader.cells["found"].passes >= 1.0
     trip = read_trip(tmp_path / "trips" / "charge" / "trip.mcap").trip
@@ -212,11 +217,16 @@ def test_a_suite_stands_in_for_dblv1(reader: Reader) -> None:
     reader.follow(DOCS / "dblv1.md")
 
 
-@pytest.mark.parametrize("notebook", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
-def test_notebooks_run(notebook: Path, reader: Reader) -> None:
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    assert cells
-    for one in cells:
-        if one["cell_type"] == "code":
-            assert not one["outputs"] and one["execution_count"] is None, "a notebook is kept without outputs"
-            reader.cell("".join(one["source"]))
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_notebooks_are_their_tutorials_and_run(name: str, reader: Reader) -> None:
+    text = (DOCS / "notebooks" / f"{name}.ipynb").read_text(encoding="utf-8")
+    assert text == notebook(tutorial(name)), "python docs/stage.py notebooks"
+    if name == "vilad":
+        needs_training()
+    for one in json.loads(text)["cells"]:
+        source = "".join(one["source"])
+        if one["cell_type"] == "code" and source.startswith("!"):
+            for line in source.splitlines():
+                reader.line(line.removeprefix("!"))
+        elif one["cell_type"] == "code":
+            reader.cell(source)
