@@ -29,7 +29,7 @@ ELSEWHERE = {
     "src/chauffeur/planners/vlm/weights/MODEL_CARD.md": "cards/vlm.md",
     "src/chauffeur/planners/vilad/weights/MODEL_CARD.md": "cards/vilad-parking.md",
     "src/chauffeur/planners/vilad/weights/drive/MODEL_CARD.md": "cards/vilad-drive.md",
-    "src/chauffeur/planners/vilad/weights/frames/MODEL_CARD.md": "cards/vilad-frames.md",
+    "src/chauffeur/models/vilad/weights/frames/MODEL_CARD.md": "cards/vilad-frames.md",
     "src/chauffeur/models/bev_llm/weights/MODEL_CARD.md": "cards/bev-llm.md",
     "src/chauffeur/models/sorting/CARD.md": "cards/sorting.md",
 }

@@ -155,7 +155,7 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
 
 def needs_training() -> None:
     for library in ("torch", "onnxscript"):
-        pytest.importorskip(library, reason=f"{library} is not installed: pip install 'chauffeur[models]'")
+        pytest.importorskip(library, reason=f"{library} is not installed: pip install 'chauffeur-lab[models]'")
 
 
 def free_port() -> int:
