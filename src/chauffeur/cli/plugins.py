@@ -23,7 +23,7 @@ def plugins(
         bool, typer.Option("--load", help="Import each one; without it their modules are looked for, and not run.")
     ] = False,
 ) -> None:
-    """List worlds, planners, executors, driving APIs, checks, benchmarks, memories and commands, and the packages they come from.
+    """List every kind of plug-in, from worlds to commands, and the packages they come from.
 
     Exit code 1 where one of them cannot be loaded.
     """

@@ -115,17 +115,18 @@ def write_moving_picture(path: Path, recorded: RecordedTrip, width: int = 880) -
         DataError: Nothing was driven, or the file cannot be written.
     """
     shots, events = _shots(recorded), events_of(recorded)
-    shown = [shots[0]]
-    for shot in shots[1:]:
-        if shot.time_s - shown[-1].time_s > _FRAME_S - 1e-6 or shot is shots[-1]:
-            shown.append(shot)
+    shown = [0]
+    for index in range(1, len(shots)):
+        if shots[index].time_s - shots[shown[-1]].time_s > _FRAME_S - 1e-6 or index == len(shots) - 1:
+            shown.append(index)
     pictures: list[Image.Image] = []
-    for shot in shown:
-        past = [event for event in events if 0.0 <= shot.time_s - event.time_s <= _TOLD_S]
-        moment = Moment(shots.index(shot), min(past, key=lambda e: (_RANK[e.kind], -e.time_s), default=None))
+    for index in shown:
+        past = [event for event in events if 0.0 <= shots[index].time_s - event.time_s <= _TOLD_S]
+        moment = Moment(index, min(past, key=lambda e: (_RANK[e.kind], -e.time_s), default=None))
         sheet = _sheet(recorded, shots, (moment,))
         pictures.append(sheet.resize((width, round(sheet.height * width / sheet.width)), Image.Resampling.LANCZOS))
-    still_ms = [round(1000.0 * (after.time_s - before.time_s)) for before, after in pairwise(shown)] + [_HELD_MS]
+    times = [shots[index].time_s for index in shown]
+    still_ms = [round(1000.0 * (after - before)) for before, after in pairwise(times)] + [_HELD_MS]
     buffer = io.BytesIO()
     pictures[0].save(
         buffer, "WEBP", save_all=True, append_images=pictures[1:], duration=still_ms, loop=0, quality=_QUALITY, method=6
@@ -140,7 +141,7 @@ def _shots(recorded: RecordedTrip) -> tuple[Observation, ...]:
     return shots
 
 
-def _sheet(recorded: RecordedTrip, shots: Sequence[Observation], moments: Sequence[Moment]) -> Image.Image:
+def _sheet(recorded: RecordedTrip, shots: tuple[Observation, ...], moments: Sequence[Moment]) -> Image.Image:
     """Title and pictures."""
     camera = frame_drive(shots)
     road = draw_road(shots[0].road, shots[0].objects, track_box(_path(shots)).grown(200.0))
