@@ -101,7 +101,7 @@ async def _browse(look: Callable[[Tab], object]) -> None:
 
 
 if __name__ == "__main__":
-    sys.path.append(str(ROOT / "tests" / "hmi" / "cabin"))
+    sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "hmi" / "cabin")]
     from chromium import Tab, browser
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
