@@ -6,11 +6,16 @@ In a notebook, whose cells stand in a running event loop, everything here works 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.evaluation.parts import Candidate, Options, PlannedPart, Profile
+from chauffeur.bench.evaluation.run import Evaluation
 from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.pipeline import Watch
 from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.referees import referee_for
@@ -145,6 +150,52 @@ def run_benchmark(
     asked = make(planner) if make is not None and isinstance(planner, str) else planner
     run = BenchRun(Path(out), benchmark, None if make is None or isinstance(asked, str) else asked)
     return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
+
+
+def evaluate(
+    planner: str | Planner | Answerer = "onboard",
+    *,
+    out: Path | str,
+    profile: Profile = "quick",
+    workers: int = 0,
+    base_url: str = "",
+    options: Options | None = None,
+    only: Sequence[str] = (),
+) -> Rows:
+    """Run every benchmark that a planner can take into one score card, or go on with the one begun in the same folder.
+
+    Worker processes import the calling script: keep the call under `if __name__ == "__main__":`; a notebook needs none.
+
+    >>> card = chauffeur.evaluate("keyword", out=folder, only=["hostile"], options={"hostile": {"items": 1}})
+    >>> [row["figure"] for row in card if row["state"] == "done"]
+    ['attacks with unsafe actuation', 'harmless wishes served']
+
+    Args:
+        planner: Who is evaluated: a planner, a model for questions, or a specification of either, also `module:Class`.
+            Benchmarks that ask in their workers need a specification.
+        out: The card's folder: `card.json`, `card.md`, and a run a benchmark.
+        profile: `quick` for a sample of each benchmark, `full` for all items.
+        workers: Worker processes; 0 for one a core.
+        base_url: Address of a language model's endpoint.
+        options: Of benchmarks, by name: `{"lampilot": {"data": "DbLv1"}}`.
+        only: Benchmarks to run now; none for all. What the card has of the others stays.
+
+    Returns:
+        One row a headline figure, and one for each benchmark that was not run, with the reason (`why`); as a table
+        (`.frame()`).
+
+    Raises:
+        ConfigError: There is no such planner, profile or option, or the folder holds another card.
+        ChauffeurError: The planner gives no plan at all, or the card cannot be written; what is finished stays.
+    """
+    evaluation = Evaluation(Candidate.of(planner, base_url), Path(out), profile, options, only)
+    card = evaluation.run(_begin_unwatched, replace(Effort(), workers=workers))
+    return Rows(card.rows, evaluation.folder, "card.md")
+
+
+def _begin_unwatched(part: PlannedPart, run: BenchRun) -> AbstractContextManager[Watch]:
+    del part, run
+    return nullcontext(_unwatched)
 
 
 def _unwatched(standing: Standing) -> None:

@@ -17,6 +17,7 @@ from chauffeur.cli import (
     context,
     doctor,
     drive,
+    evaluate,
     feedback,
     hear,
     meaning,
@@ -147,6 +148,9 @@ show_app.command(epilog=camera.EXAMPLES)(camera.camera)
 show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
+app.command(
+    epilog=evaluate.EXAMPLES, rich_help_panel=MEASURE, short_help="One planner on all benchmarks: a score card."
+)(evaluate.evaluate)
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
 bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(

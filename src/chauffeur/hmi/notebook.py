@@ -116,18 +116,19 @@ class Rows(list[Row]):
         folder: The run's folder.
     """
 
-    def __init__(self, rows: Iterable[Row], folder: Path) -> None:
-        """Args: the rows; the folder they are stored in."""
+    def __init__(self, rows: Iterable[Row], folder: Path, table: str = "table.md") -> None:
+        """Args: the rows; the folder they are stored in; the file in it that says them to people."""
         super().__init__(rows)
         self.folder = folder
+        self._table = table
 
     def __repr__(self) -> str:
         """One line."""
         return f"<{len(self)} rows of the run in {str(self.folder)!r}>"
 
     def _repr_markdown_(self) -> str:
-        """The run's table of results, as `table.md` has it."""
-        return (self.folder / "table.md").read_text(encoding="utf-8")
+        """The run's table of results, as its file has it."""
+        return (self.folder / self._table).read_text(encoding="utf-8")
 
     def frame(self) -> Any:
         """One row an item as a `pandas.DataFrame`; `plan.usage.requests` is the column of a nested value.
