@@ -30,12 +30,12 @@ def replay(
     """
     from rich.text import Text
 
-    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import limits_named
     from chauffeur.driving.again import drive_again
     from chauffeur.driving.divergence import probable_reasons
+    from chauffeur.driving.judge.choice import referee_for
     from chauffeur.driving.recording import compare_trips, read_trip
     from chauffeur.memory.personal_limits import personal_limits
 

@@ -38,13 +38,13 @@ def what_if(
     from rich.table import Table
     from rich.text import Text
 
-    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.compilation import CompilationNotice
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.drive import save_trip
     from chauffeur.cli.parts import limits_named, planner_named
     from chauffeur.cli.show import Teller
     from chauffeur.driving.again import drive_otherwise
+    from chauffeur.driving.judge.choice import referee_for
     from chauffeur.driving.recording import read_trip
     from chauffeur.hmi.words import pace_of, seed_words
     from chauffeur.memory.personal_limits import personal_limits

@@ -40,6 +40,8 @@ from chauffeur.concept.nouns import (
     Parameters,
     ParkingLot,
     ParkingSpot,
+    Part,
+    PartResult,
     PersonId,
     Plan,
     PlanRequest,
@@ -59,7 +61,7 @@ from chauffeur.concept.nouns import (
     lines_before_library,
     mark_of,
 )
-from chauffeur.concept.results import ANSWERED, ASKS, RESULT_LABELS, Result, result_of
+from chauffeur.concept.results import ANSWERED, ASKS, Result, result_of
 from chauffeur.concept.scene import (
     STOP_ZONE_M,
     STOPPED_MPS,
@@ -83,7 +85,6 @@ __all__ = [
     "HELPERS_HEAD",
     "LAMPILOT_LIMITS",
     "NOBODY",
-    "RESULT_LABELS",
     "STOPPED_MPS",
     "STOP_ZONE_M",
     "ActionMatrix",
@@ -123,6 +124,8 @@ __all__ = [
     "Parameters",
     "ParkingLot",
     "ParkingSpot",
+    "Part",
+    "PartResult",
     "PersonId",
     "Plan",
     "PlanRequest",

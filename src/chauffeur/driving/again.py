@@ -27,6 +27,7 @@ from chauffeur.concept import (
 )
 from chauffeur.driving import event_loop
 from chauffeur.driving.emergency import not_checked, planned_for
+from chauffeur.driving.episode import drive_policy, make_world, trip_s
 from chauffeur.driving.events import Listener, nobody_listens
 from chauffeur.driving.planning import declined
 from chauffeur.driving.recording import RecordedTrip
@@ -34,10 +35,7 @@ from chauffeur.driving.session import (
     RefereeMaker,
     Session,
     check_drive,
-    drive_policy,
-    make_world,
     parse_wish,
-    trip_s,
 )
 from chauffeur.planners.base import Planner
 from chauffeur.worlds.base import World

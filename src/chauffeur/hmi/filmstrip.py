@@ -59,6 +59,7 @@ _RANK: dict[EventKind, int] = {
     "stopped": 5,
     "said": 6,
     "finished": 7,
+    "drove_on": 8,
 }
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -257,7 +258,9 @@ class _Panel:
         for bar in road.bars_m:
             self._line(bar, BAR_M, _MARK)
         self._line(_path(so_far), 0.45, _TRAIL)
-        for sign in road.stop_signs:
+        for sign in road.signs:
+            if sign.kind != "stop" or sign.line_m is None:
+                continue
             self._line(sign.line_m, 0.5, _MARK)
             self._octagon(sign.post_m)
         for thing in shot.objects:
