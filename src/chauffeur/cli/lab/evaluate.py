@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.lab.bench_run import UNFINISHED, effort, planner_options
+from chauffeur.cli.lab.bench_run import UNFINISHED, effort
 from chauffeur.cli.options import BaseUrl, BenchOptions, Concurrency, MaxRequests, MaxUsd, Price, Workers
+from chauffeur.cli.parts import planner_options
 
 if TYPE_CHECKING:
     from rich.console import Console
