@@ -14,8 +14,8 @@ from coached_data import server_module
 from small_run import LEFT, Inline, make_data, quiet
 
 from chauffeur.bench.evaluation.card import ScoreCard, read_card
-from chauffeur.bench.evaluation.compare import Comparison, compare_cards
-from chauffeur.bench.evaluation.parts import Candidate, part_of, planned_parts
+from chauffeur.bench.evaluation.compare import CardComparison, compare_cards
+from chauffeur.bench.evaluation.parts import Evaluated, part_of, planned_parts
 from chauffeur.bench.evaluation.run import Evaluation
 from chauffeur.bench.kernel.benchmark import GROUP
 from chauffeur.bench.kernel.budget import SpendingBudget
@@ -57,7 +57,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def evaluated(folder: Path, data: Path, who: Any = None, items: int = ITEMS, **effort: Any) -> ScoreCard:
     options = {"lampilot": {"data": str(data), "items": items}}
-    evaluation = Evaluation(Candidate.of(who or Left()), folder, "quick", options, ["lampilot"])
+    evaluation = Evaluation(Evaluated.of(who or Left()), folder, "quick", options, ["lampilot"])
     return evaluation.run(no_watch, replace(IN_THIS_PROCESS, **effort))
 
 
@@ -105,7 +105,7 @@ def test_a_folder_holds_one_planner_and_profile(card: Path, data: Path) -> None:
     with pytest.raises(ConfigError, match="score card of left"):
         evaluated(card, data, Other())
     with pytest.raises(ConfigError, match="score card of quick"):
-        Evaluation(Candidate.of(Left()), card, "full")
+        Evaluation(Evaluated.of(Left()), card, "full")
 
 
 def test_what_a_planner_cannot_take_is_named_with_reason_and_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,7 +114,7 @@ def test_what_a_planner_cannot_take_is_named_with_reason_and_remedy(monkeypatch:
     monkeypatch.setattr(
         "chauffeur.bench.evaluation.parts.find_spec", lambda name: None if name == "libsumo" else object()
     )
-    parts = {one.name: one for one in planned_parts(Candidate.of("keyword"), "quick", {})}
+    parts = {one.name: one for one in planned_parts(Evaluated.of("keyword"), "quick", {})}
     assert set(parts) == set(plugin_names(GROUP))
     assert parts["passengers"].benchmark is not None and parts["hostile"].benchmark is not None
     for name, why, remedy in (
@@ -130,20 +130,20 @@ def test_what_a_planner_cannot_take_is_named_with_reason_and_remedy(monkeypatch:
 
 
 def test_a_planner_without_a_name_is_not_asked_in_workers() -> None:
-    parts = {one.name: one for one in planned_parts(Candidate.of(Left()), "quick", {})}
+    parts = {one.name: one for one in planned_parts(Evaluated.of(Left()), "quick", {})}
     assert "by name" in parts["leaderboard"].why and "module:Class" in parts["leaderboard"].remedy
     assert parts["passengers"].benchmark is not None
 
 
 def test_planners_of_other_policies_take_other_benchmarks() -> None:
-    gains = {one.name for one in planned_parts(Candidate.of("gains"), "quick", {}) if one.benchmark is not None}
-    vilad = {one.name for one in planned_parts(Candidate.of("vilad"), "quick", {}) if one.benchmark is not None}
+    gains = {one.name for one in planned_parts(Evaluated.of("gains"), "quick", {}) if one.benchmark is not None}
+    vilad = {one.name for one in planned_parts(Evaluated.of("vilad"), "quick", {}) if one.benchmark is not None}
     assert gains == {"motion", "motion-passengers"} and vilad == {"instructions"}
 
 
 def test_a_planner_that_answers_nowhere_is_an_error_before_anything_is_run(tmp_path: Path) -> None:
     with pytest.raises(PlannerError, match="It is gone"):
-        Evaluation(Candidate.of(Silent()), tmp_path)
+        Evaluation(Evaluated.of(Silent()), tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -153,7 +153,7 @@ def test_a_planner_that_answers_nowhere_is_an_error_before_anything_is_run(tmp_p
 )
 def test_what_is_mistyped_is_named(tmp_path: Path, profile: Any, options: Any, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
-        Evaluation(Candidate.of(Left()), tmp_path, profile, options)
+        Evaluation(Evaluated.of(Left()), tmp_path, profile, options)
 
 
 def test_an_interrupt_keeps_what_is_finished(tmp_path: Path, data: Path) -> None:
@@ -161,7 +161,7 @@ def test_an_interrupt_keeps_what_is_finished(tmp_path: Path, data: Path) -> None
         raise KeyboardInterrupt
 
     options = {"lampilot": {"data": str(data), "items": ITEMS}}
-    first = Evaluation(Candidate.of(Left()), tmp_path, "quick", options, ["lampilot"])
+    first = Evaluation(Evaluated.of(Left()), tmp_path, "quick", options, ["lampilot"])
     with pytest.raises(KeyboardInterrupt):
         first.run(lambda *_: nullcontext(stop), IN_THIS_PROCESS)
     states = {one.name: one.state for one in read_card(tmp_path).entries}
@@ -221,7 +221,7 @@ def test_a_benchmark_that_says_nothing_of_cards_has_its_first_measure(
 ) -> None:
     monkeypatch.setattr("chauffeur.bench.evaluation.parts.plugin_names", lambda group: ("asked",))
     monkeypatch.setattr("chauffeur.bench.evaluation.parts.load_plugin", lambda group, name: Asked)
-    found = Evaluation(Candidate.of(Left()), tmp_path).run(no_watch, IN_THIS_PROCESS)
+    found = Evaluation(Evaluated.of(Left()), tmp_path).run(no_watch, IN_THIS_PROCESS)
     (entry,) = found.entries
     assert [(one.metric, one.found.value) for one in entry.figures] == [("asked-answered-v1", 1.0)]
     assert entry.judge == "Not told by the benchmark."
@@ -258,7 +258,7 @@ def test_another_planner_is_compared_item_by_item(tmp_path: Path) -> None:
     assert any("Planners: left (left-v1) and stays" in note for note in found.notes)
 
 
-def _changed(card: Path, folder: Path, change: Any) -> Comparison:
+def _changed(card: Path, folder: Path, change: Any) -> CardComparison:
     stored = json.loads((card / "card.json").read_text())
     for entry in stored["entries"]:
         change(entry)
@@ -329,7 +329,7 @@ def server() -> Iterator[Any]:
 @pytest.mark.server
 def test_a_served_model_is_evaluated_within_one_budget(tmp_path: Path, data: Path, server: Any) -> None:
     server.script(MODEL.whole(f"Thoughts: Left.\n\n```python{LEFT.format(patience=1)}```\n"))
-    who = Candidate.of("openai/m", server.url, attempts=1, stream=False, cache=False)
+    who = Evaluated.of("openai/m", server.url, attempts=1, stream=False, cache=False)
     options = {"lampilot": {"data": str(data), "items": ITEMS}}
     evaluation = Evaluation(who, tmp_path, "quick", options, ["lampilot"])
     found = evaluation.run(no_watch, replace(IN_THIS_PROCESS, budget=SpendingBudget(max_requests=2), concurrency=1))

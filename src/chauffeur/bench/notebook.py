@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.evaluation.parts import Candidate, Options, PlannedPart, Profile
+from chauffeur.bench.evaluation.parts import Evaluated, Options, PlannedPart, Profile
 from chauffeur.bench.evaluation.run import Evaluation
 from chauffeur.bench.kernel.benchmark import make_benchmark
 from chauffeur.bench.kernel.pipeline import Watch
@@ -39,7 +39,7 @@ def evaluated(
     only: Sequence[str],
 ) -> Rows:
     """Run a planner on every benchmark that it can take; see `chauffeur.evaluate`."""
-    evaluation = Evaluation(Candidate.of(planner, base_url), out, profile, options, only)
+    evaluation = Evaluation(Evaluated.of(planner, base_url), out, profile, options, only)
     card = evaluation.run(_begin_unwatched, replace(Effort(), workers=workers))
     return Rows(card.rows, evaluation.folder, "card.md")
 

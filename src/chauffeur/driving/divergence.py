@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-import platform
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from itertools import zip_longest
 from typing import Any, Final
 
-from chauffeur.concept import Frame, Verdict
+from chauffeur.concept import Frame, Limits, Verdict
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.recording import Difference, RecordedTrip
-from chauffeur.driving.session import make_world
+from chauffeur.driving.trips import provenance
 from chauffeur.safety.shield import SHIELD_VERSION
-from chauffeur.version import __version__
 
 APART_M: Final = 0.1
 """So far from one another two egos have parted; less cannot be seen in a lane."""
@@ -135,12 +134,9 @@ def _relative(difference: Difference) -> float | None:
 def _changed(recorded: RecordedTrip) -> Iterator[str]:
     trip = recorded.trip
     then = dict(trip.record)
-    now = {
-        "chauffeur": __version__,
-        "engine": make_world(recorded.scenario).engine,
-        "python": platform.python_version(),
-        "shield": SHIELD_VERSION,
-    }
+    scenario = recorded.scenario
+    today = provenance(trip.plan, scenario, trip.seed, Limits(), make_world(scenario).engine)
+    now = {**dict(today), "shield": SHIELD_VERSION}
     for name, said in _NAMED.items():
         if name in then and then[name] != now[name]:
             yield f"Recorded with {said} {then[name]}; now {now[name]}."

@@ -45,7 +45,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class CardComparison:
     """Two cards compared.
 
     Attributes:
@@ -62,7 +62,7 @@ class Comparison:
     notes: tuple[str, ...]
 
 
-def compare_cards(old: Path, new: Path) -> Comparison:
+def compare_cards(old: Path, new: Path) -> CardComparison:
     """Compare the cards of two folders; intervals are paired, over the items of both runs.
 
     Raises:
@@ -83,7 +83,7 @@ def compare_cards(old: Path, new: Path) -> Comparison:
         else:
             changes += _changes(before, entry, old, new)
     refused += [(name, "It is on the old card only.") for name, one in known.items() if one.figures]
-    return Comparison(first, second, tuple(changes), tuple(refused), tuple(_notes(first, second)))
+    return CardComparison(first, second, tuple(changes), tuple(refused), tuple(_notes(first, second)))
 
 
 def _unlike(old: CardEntry, new: CardEntry) -> str:

@@ -25,7 +25,7 @@ Options = Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class Evaluated:
     """Who is evaluated.
 
     Attributes:
@@ -39,7 +39,7 @@ class Candidate:
     base_url: str = ""
 
     @classmethod
-    def of(cls, planner: str | Planner | Answerer, base_url: str = "", **options: Any) -> Candidate:
+    def of(cls, planner: str | Planner | Answerer, base_url: str = "", **options: Any) -> Evaluated:
         """Make a candidate of a specification, or take the object. Raises ConfigError as `make_planner`."""
         if not isinstance(planner, str):
             return cls(planner)
@@ -79,7 +79,7 @@ class _NotRun(Exception):  # noqa: N818 - a verdict, caught below
 
 
 def planned_parts(
-    who: Candidate, profile: Profile, options: Options, only: Sequence[str] = ()
+    who: Evaluated, profile: Profile, options: Options, only: Sequence[str] = ()
 ) -> tuple[PlannedPart, ...]:
     """Every installed benchmark, in the order of names; those not in `only`, where that names some, are left out.
 
@@ -122,7 +122,7 @@ def _kind(make: Any) -> Any:
 
 
 def _planned(
-    name: str, who: Candidate, profile: Profile, own: Mapping[str, Any], kinds: Mapping[str, str]
+    name: str, who: Evaluated, profile: Profile, own: Mapping[str, Any], kinds: Mapping[str, str]
 ) -> PlannedPart:
     part = None
     try:
@@ -138,7 +138,7 @@ def _planned(
 def _made(
     name: str,
     part: CardPart | None,
-    who: Candidate,
+    who: Evaluated,
     profile: Profile,
     own: Mapping[str, Any],
     kinds: Mapping[str, str],
@@ -173,7 +173,7 @@ def _made(
     return benchmark
 
 
-def _answers(asks: str, who: Candidate) -> None:
+def _answers(asks: str, who: Evaluated) -> None:
     """Raise _NotRun for a candidate that does not give what is asked for, plans or words."""
     if asks == "words" and not isinstance(who.made, Answerer):
         raise _NotRun(f"It asks for words; {who.made.id} answers no questions.", "Name a model, e.g. openai/gpt-4o.")
@@ -181,7 +181,7 @@ def _answers(asks: str, who: Candidate) -> None:
         raise _NotRun(f"It asks for plans; {who.made.id} plans nothing.", "Name a planner.")
 
 
-def _fits(part: CardPart, who: Candidate, kinds: Mapping[str, str]) -> None:
+def _fits(part: CardPart, who: Evaluated, kinds: Mapping[str, str]) -> None:
     """Raise _NotRun for a planner that writes nothing that the benchmark drives."""
     if part.drives:
         _answers("plans", who)

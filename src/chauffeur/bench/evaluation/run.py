@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.evaluation.card import CARD, CardEntry, ScoreCard, entry_of, figures_of, read_card
-from chauffeur.bench.evaluation.parts import LEFT_OUT, Candidate, Options, PlannedPart, Profile, planned_parts
+from chauffeur.bench.evaluation.parts import LEFT_OUT, Evaluated, Options, PlannedPart, Profile, planned_parts
 from chauffeur.bench.kernel.budget import Bill, SpendingBudget
 from chauffeur.bench.kernel.pipeline import Watch
 from chauffeur.bench.kernel.run import BenchRun, Effort
@@ -34,7 +34,7 @@ class Evaluation:
 
     def __init__(
         self,
-        who: Candidate,
+        who: Evaluated,
         folder: Path,
         profile: Profile = "quick",
         options: Options | None = None,

@@ -43,7 +43,7 @@ def evaluate(
     workers: Workers = None,
 ) -> None:
     """Run a planner on every benchmark that it can take, into one score card."""
-    from chauffeur.bench.evaluation.parts import Candidate
+    from chauffeur.bench.evaluation.parts import Evaluated
     from chauffeur.bench.evaluation.run import Evaluation
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
@@ -54,7 +54,7 @@ def evaluate(
         show_comparison(console, *compare)
         return
     work = effort(workers, concurrency, max_usd, max_requests, price)
-    who = Candidate.of(planner, base_url or "", **planner_options(planner, None))
+    who = Evaluated.of(planner, base_url or "", **planner_options(planner, None))
     name = planner.replace("/", "-").replace(":", "-")
     folder = out or Path("runs") / f"evaluate-{name}-{profile}"
     evaluation = Evaluation(who, folder, cast("Profile", profile), _options(option or []), benchmarks or ())
