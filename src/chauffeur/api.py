@@ -10,11 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.benchmark import GROUP, asked_by, benchmark_from, takes_planner
 from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.stages import made_by
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario
+from chauffeur.concept.registry import load_plugin
 from chauffeur.driving import event_loop
 from chauffeur.driving.recording import write_trip
 from chauffeur.driving.scenarios import find, planner_for, suiting
@@ -23,7 +25,7 @@ from chauffeur.hmi.notebook import Drive, Rows
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.personal_limits import personal_limits
 from chauffeur.planners.base import Answerer, Planner
-from chauffeur.planners.registry import make_answerer, make_planner
+from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
 
 
@@ -112,7 +114,7 @@ async def _drive(
 
 def run_benchmark(
     name: str,
-    planner: str | Planner | Answerer = "onboard",
+    planner: str | Planner | Answerer | None = None,
     *,
     out: Path | str,
     workers: int = 0,
@@ -128,7 +130,8 @@ def run_benchmark(
 
     Args:
         name: As `chauffeur bench` knows it.
-        planner: Who is asked: a planner for plans, a model for questions, or a specification of either.
+        planner: Who is asked: a planner for plans, a model for questions, or a specification of either. By default the
+            benchmark's own choice, which is `onboard` for most.
         out: The run's folder: results, table, provenance.
         workers: Worker processes; 0 for one a core.
         options: The benchmark's own, as `--option` of its command takes them.
@@ -140,10 +143,11 @@ def run_benchmark(
         ConfigError: There is no such benchmark, planner or option, or the folder holds another run.
         ChauffeurError: The run cannot go on; what is finished stays.
     """
-    benchmark = make_benchmark(name, **options)
-    make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
-    asked = make(planner) if make is not None and isinstance(planner, str) else planner
-    run = BenchRun(Path(out), benchmark, None if make is None or isinstance(asked, str) else asked)
+    make = load_plugin(GROUP, name)
+    if planner is not None and takes_planner(make):
+        options["planner"] = planner if isinstance(planner, str) else planner.id
+    benchmark = benchmark_from(make, name, **options)
+    run = BenchRun(Path(out), benchmark, asked_by(benchmark, planner), made=made_by(name, options))
     return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
 
 

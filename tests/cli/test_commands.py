@@ -17,7 +17,7 @@ import typer
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
-from chauffeur.cli.bench_plugin import BenchGroup, command_of
+from chauffeur.cli.bench import BenchGroup, command_of
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app

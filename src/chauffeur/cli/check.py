@@ -102,24 +102,11 @@ def benchmark(
     """
     from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
+    from chauffeur.cli.bench_run import named_values
 
-    given = _options(option or [])
+    given = named_values(option or [])
     own = ":" in name
     _tell(check_benchmark(benchmark_from(_named(name), name, **given) if own else make_benchmark(name, **given)))
-
-
-def _options(given: list[str]) -> dict[str, Any]:
-    """Options of a benchmark: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
-    found: dict[str, Any] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise ConfigError(f"{text!r} is no option.", hint="Write -o NAME=VALUE.")
-        try:
-            found[name] = json.loads(value)
-        except ValueError:
-            found[name] = value
-    return found
 
 
 def _tell(findings: Sequence[ConformanceFinding]) -> None:
@@ -147,8 +134,6 @@ def _module(name: str) -> ModuleType:
     import os
     import sys
 
-    from chauffeur.concept import ConfigError
-
     if os.getcwd() not in sys.path:  # noqa: PTH109 - where the person stands, as `python -m` has it
         sys.path.insert(0, os.getcwd())  # noqa: PTH109
     try:
@@ -159,7 +144,6 @@ def _module(name: str) -> ModuleType:
 
 def _named(name: str) -> Any:
     """What `module:NAME` names. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
 
     module_name, _, own = name.partition(":")
     module = _module(module_name)
@@ -170,7 +154,6 @@ def _named(name: str) -> Any:
 
 def _maker(kind: str, name: str) -> Callable[..., Any]:
     """The class or function at `module:NAME`: a check makes several of its kind. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
 
     found = _named(name)
     if not callable(found):
@@ -180,7 +163,6 @@ def _maker(kind: str, name: str) -> Callable[..., Any]:
 
 def _world_class(name: str) -> Callable[[], Any]:
     """What makes the world at `module:NAME`, the only one of a module, or a registered one. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
     from chauffeur.concept.registry import load_plugin, plugin_names
 
     module_name, _, class_name = name.partition(":")
@@ -201,7 +183,6 @@ def _world_class(name: str) -> Callable[[], Any]:
 
 def _scenario(name: str, scenario: str, config: str, seed: int) -> Any:
     """The scenario to check on. Raises ConfigError."""
-    import json
     from dataclasses import replace
 
     from chauffeur.concept import ConfigError, Scenario

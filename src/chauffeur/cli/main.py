@@ -8,7 +8,6 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
     camera,
@@ -25,13 +24,9 @@ from chauffeur.cli import (
     replay,
     report,
     scenarios,
-    scenes,
-    scenes_frames,
     talk,
-    train,
     unmasking,
 )
-from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.check import check_app
@@ -40,8 +35,10 @@ from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
+from chauffeur.cli.tasks import add_task, scenes_app, train_app
 from chauffeur.cli.vehicle import vehicle_app
 from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.models.tasks import adapt_vlm, quantise_vlm
 from chauffeur.version import __version__
 
 EXAMPLES = help_text("main")
@@ -139,18 +136,16 @@ bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(
     coach_town.coach_town
 )
-scenes.scenes_app.command(epilog=scenes_frames.FRAMES_EXAMPLES)(scenes_frames.frames)
-scenes.scenes_app.command(epilog=scenes_frames.SFT_EXAMPLES)(scenes_frames.sft)
-bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
+bench_app.add_typer(scenes_app, name="scenes", epilog=help_text("scenes generate"))
 
 app.add_typer(model_app, name="model", rich_help_panel=BUILD)
 app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
 app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
 app.add_typer(check_app, name="check", rich_help_panel=BUILD)
-model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
-model_app.command("adapt-vlm", epilog=adapting_vlm.EXAMPLES)(adapting_vlm.adapt_vlm)
-model_app.command("quantise-vlm", epilog=quantising_vlm.EXAMPLES)(quantising_vlm.quantise_vlm)
+model_app.add_typer(train_app, name="train", epilog=help_text("train onboard"))
+add_task(model_app, "adapt-vlm", adapt_vlm, "adapt_vlm")
+add_task(model_app, "quantise-vlm", quantise_vlm, "quantise_vlm")
 model_app.add_typer(policies.policies_app, name="policies")
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits
+from chauffeur.concept.needs import needs
 
 if TYPE_CHECKING:
     from chauffeur.concept import Context, Observation
@@ -16,29 +16,6 @@ if TYPE_CHECKING:
     from chauffeur.planners.prompts import Setting
 
 _LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
-
-
-def needs(extra: str, what: str, *modules: str) -> None:
-    """Say before any work is done that an extra is missing. Nothing is imported.
-
-    Args:
-        extra: The extra of this package that brings the modules.
-        what: Who needs it, as the subject of a sentence.
-        modules: Top-level modules.
-
-    Raises:
-        MissingExtraError: One cannot be found; the hint installs the extra for this interpreter.
-    """
-    missing = [name for name in modules if not _importable(name)]
-    if missing:
-        raise MissingExtraError(f"{what} needs {', '.join(missing)}.", extra=extra)
-
-
-def _importable(name: str) -> bool:
-    try:
-        return find_spec(name) is not None
-    except ValueError:  # it is being kept from being imported
-        return False
 
 
 def limits_named(name: str) -> Limits:

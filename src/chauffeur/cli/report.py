@@ -48,8 +48,8 @@ def report(
     from chauffeur.bench.report.text import render_markdown
     from chauffeur.cli.bench_run import show_tables
     from chauffeur.cli.console import columns, path_text, plain, stdout
-    from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
+    from chauffeur.concept.needs import needs
     from chauffeur.driving.files import publish
     from chauffeur.hmi.report_page import write_report_page
 
