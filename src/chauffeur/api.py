@@ -6,27 +6,25 @@ In a notebook, whose cells stand in a running event loop, everything here works 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from chauffeur.bench.kernel.benchmark import GROUP, asked_by, benchmark_from, takes_planner
-from chauffeur.bench.kernel.progress import Standing
-from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.kernel.stages import made_by
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario
-from chauffeur.concept.registry import load_plugin
+from chauffeur.concept.lab import needs_lab
 from chauffeur.driving import event_loop
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import write_trip
 from chauffeur.driving.scenarios import find, planner_for, suiting
 from chauffeur.driving.session import Forgetful, Session, parse_wish
-from chauffeur.hmi.notebook import Drive, Rows
+from chauffeur.hmi.notebook import Drive
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.personal_limits import personal_limits
 from chauffeur.planners.base import Answerer, Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
+
+if TYPE_CHECKING:
+    from chauffeur.bench.notebook import Rows
 
 
 def drive(
@@ -140,16 +138,11 @@ def run_benchmark(
         One row an item, as `results.jsonl` has them, and as a table (`.frame()`).
 
     Raises:
+        MissingExtraError: `chauffeur-lab` is not installed.
         ConfigError: There is no such benchmark, planner or option, or the folder holds another run.
         ChauffeurError: The run cannot go on; what is finished stays.
     """
-    make = load_plugin(GROUP, name)
-    if planner is not None and takes_planner(make):
-        options["planner"] = planner if isinstance(planner, str) else planner.id
-    benchmark = benchmark_from(make, name, **options)
-    run = BenchRun(Path(out), benchmark, asked_by(benchmark, planner), made=made_by(name, options))
-    return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
+    needs_lab("A benchmark")
+    from chauffeur.bench.notebook import run_named
 
-
-def _unwatched(standing: Standing) -> None:
-    del standing
+    return run_named(name, planner, out=Path(out), workers=workers, **options)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.lampilot.metrics import points
+from chauffeur.driving.judge.metrics import points
 
 HOSTILE = "</script><img src=x onerror=alert(1)> & \u2028 '\" | _x_ $100% #1 {\\cmd} ~^ <!-- \ud800"
 

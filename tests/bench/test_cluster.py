@@ -25,7 +25,7 @@ from chauffeur.concept import ConfigError, MissingExtraError
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.server,
-    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'chauffeur[cluster]'"),
+    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'chauffeur-lab[cluster]'"),
 ]
 
 

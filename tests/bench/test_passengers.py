@@ -18,7 +18,6 @@ from small_run import Inline, quiet
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
-from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee, feasible, impossible, start_of
 from chauffeur.bench.passengers import PassengerRequests, PassengerWish, as_dataset, load_wishes
@@ -26,7 +25,8 @@ from chauffeur.bench.passengers.loader import STEMS, parse_wishes
 from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Observation
 from chauffeur.describe import describe
-from chauffeur.driving.session import drive_without_program
+from chauffeur.driving.episode import drive_without_program
+from chauffeur.driving.judge.goals import make_goal
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
 

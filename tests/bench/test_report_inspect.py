@@ -16,7 +16,7 @@ from chauffeur.concept import ConfigError, DataError, MissingExtraError
 
 INSTALLED = importlib.util.find_spec("inspect_ai") is not None
 needs_inspect = pytest.mark.skipif(
-    not INSTALLED, reason='Inspect AI is not installed: pip install "chauffeur[inspect]"'
+    not INSTALLED, reason='Inspect AI is not installed: pip install "chauffeur-lab[inspect]"'
 )
 
 

@@ -17,9 +17,9 @@ import typer
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
-from chauffeur.cli.bench import BenchGroup, command_of
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
+from chauffeur.cli.lab.bench import BenchGroup, command_of
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.concept.extras import install_command

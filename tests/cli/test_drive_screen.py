@@ -12,11 +12,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.cli.compilation import CompilationNotice
 from chauffeur.cli.parts import planner_named
 from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import Instruction, Limits, Program, Verdict
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session

@@ -16,10 +16,10 @@ from chauffeur.bench.kernel.metrics import Measure, TableSpec
 from chauffeur.bench.kernel.report import Line, ResultTable
 from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, Flip, FlipList, Gallery
+from chauffeur.bench.report.page import render_report, write_report_page
 from chauffeur.concept import DataError, Program, Verdict
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.drive_svg import draw_strip
-from chauffeur.hmi.report_page import render_report, write_report_page
 
 LABEL = "critic: evaluator"
 

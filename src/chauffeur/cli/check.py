@@ -12,6 +12,7 @@ import typer
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
 from chauffeur.concept import ConfigError
+from chauffeur.concept.lab import needs_lab
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
@@ -60,7 +61,7 @@ def planner(
 
     It is asked some twenty times. Exit code 1 where a check finds something.
     """
-    from chauffeur.cli.bench_run import planner_options
+    from chauffeur.cli.parts import planner_options
     from chauffeur.driving.conformance import check_planner
     from chauffeur.planners.registry import make_planner, planner_from
 
@@ -100,9 +101,10 @@ def benchmark(
 
     Exit code 1 where a check finds something.
     """
+    needs_lab("Checking a benchmark")
     from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
-    from chauffeur.cli.bench_run import named_values
+    from chauffeur.cli.parts import named_values
 
     given = named_values(option or [])
     own = ":" in name

@@ -28,11 +28,11 @@ def replay(
     """
     from rich.text import Text
 
-    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import limits_named
     from chauffeur.driving.again import drive_again
+    from chauffeur.driving.judge.choice import referee_for
     from chauffeur.driving.recording import compare_trips, read_trip
     from chauffeur.memory.personal_limits import personal_limits
 
@@ -68,7 +68,7 @@ def other_versions(recorded: RecordedTrip) -> list[str]:
     """What has changed on this machine since the recording, as far as it could matter."""
     import platform
 
-    from chauffeur.driving.session import make_world
+    from chauffeur.driving.episode import make_world
     from chauffeur.version import __version__
 
     changed: list[str] = []

@@ -13,9 +13,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from chauffeur.concept import DataError, Limits, Observation, Scenario
 from chauffeur.driving.emergency import not_checked, planned_for
+from chauffeur.driving.episode import drive_policy, make_world, trip_s
 from chauffeur.driving.planning import declined
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import RefereeMaker, check_drive, drive_policy, make_world, trip_s
+from chauffeur.driving.session import RefereeMaker, check_drive
 from chauffeur.worlds.base import World
 
 _limits = TypeAdapter(Limits)

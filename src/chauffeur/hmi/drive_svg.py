@@ -148,7 +148,9 @@ def _road(road: PaintedRoad) -> str:
     )
     parts.extend(f'<polyline class="r-paint r-{line.style}" points="{_points(line.points_m)}"/>' for line in road.lines)
     parts.extend(f'<polyline class="r-paint r-bar" points="{_points(bar)}"/>' for bar in road.bars_m)
-    for sign in road.stop_signs:
+    for sign in road.signs:
+        if sign.kind != "stop" or sign.line_m is None:
+            continue
         parts.append(f'<polyline class="r-stop-line" points="{_points(sign.line_m)}"/>')
         corners = [math.pi / 8 + i * math.pi / 4 for i in range(8)]
         x, y = sign.post_m

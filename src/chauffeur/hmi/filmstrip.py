@@ -257,7 +257,9 @@ class _Panel:
         for bar in road.bars_m:
             self._line(bar, BAR_M, _MARK)
         self._line(_path(so_far), 0.45, _TRAIL)
-        for sign in road.stop_signs:
+        for sign in road.signs:
+            if sign.kind != "stop" or sign.line_m is None:
+                continue
             self._line(sign.line_m, 0.5, _MARK)
             self._octagon(sign.post_m)
         for thing in shot.objects:

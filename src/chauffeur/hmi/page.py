@@ -17,8 +17,8 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.payload import page_payload
 
-_STYLES = ("trip.css", "panels.css")
-_SCRIPTS = ("panels.js", "stage.js", "charts.js", "player.js")
+_STYLES = ("scene.css", "trip.css", "panels.css")
+_SCRIPTS = ("panels.js", "drawer.js", "stage.js", "charts.js", "player.js")
 
 
 def write_page(path: Path, recorded: RecordedTrip) -> Path:

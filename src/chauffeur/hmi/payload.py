@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterable
 from typing import Any, cast
 
 from chauffeur.concept import (
@@ -34,7 +33,7 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
-from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
+from chauffeur.hmi.road import Bounds, PaintedRoad, as_json, draw_road, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of, place_facing_right
 from chauffeur.safety.faithfulness import KINDS, score_words
 from chauffeur.worlds.town.pack import places_called
@@ -278,11 +277,11 @@ def _drive(recorded: RecordedTrip) -> Json | None:
     limits = {lane.id: lane.speed_limit_mps for lane in lanes}
     camera = frame_drive(shots)
     sight = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots)).grown(_SIGHT_M)
-    road = draw_road(shots[0].road, shots[0].objects, sight)
+    road = draw_road(shots[0].road, shots[0].objects, sight, shots[0].signs)
     return {
         "time": [round(s.time_s, 2) for s in shots],
         "camera": {"along": camera.along, "box": [round(edge, 2) for edge in camera.box.edges]},
-        "road": _road(road),
+        "road": as_json(road),
         "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
         "cones": [_body(o) for o in shots[0].objects if o.kind == "static"],
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
@@ -313,6 +312,7 @@ def _rounded(value: float | None) -> float | None:
 
 def _body(vehicle: VehicleState) -> Json:
     return {
+        "id": vehicle.id,
         "x": round(vehicle.x_m, 2),
         "y": round(vehicle.y_m, 2),
         "h": round(vehicle.heading_rad, 3),
@@ -384,18 +384,6 @@ def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[J
         if sight.x0 <= x <= sight.x1 and sight.y0 <= y <= sight.y1:
             found.append({"n": place.name, "x": round(x, 1), "y": round(y, 1), "to": place in meant})
     return found
-
-
-def _road(road: PaintedRoad) -> Json:
-    def flat(points: Iterable[tuple[float, float]]) -> list[float]:
-        return [round(value, 2) for point in points for value in point]
-
-    return {
-        "surfaces": [{"p": flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in road.surfaces],
-        "lines": [{"p": flat(line.points_m), "s": line.style} for line in road.lines],
-        "signs": [{"post": flat([s.post_m]), "line": flat(s.line_m)} for s in road.stop_signs],
-        "bars": {"w": BAR_M, "p": [flat(bar) for bar in road.bars_m]},
-    }
 
 
 def _goal(row: Frame | None, shot: Observation, road: PaintedRoad) -> int | None:

@@ -25,7 +25,7 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.concept.results import ANSWERED_LABEL
-from chauffeur.concept.units import SpeedUnit, people_speed
+from chauffeur.concept.units import MPS_PER_KMH, SpeedUnit, people_speed
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -107,18 +107,21 @@ MARK_STYLES: Final[dict[Mark, str]] = {
 }
 
 _MPH: Final = re.compile(r"\b(?:mph|miles? (?:per|an) hour)\b", re.IGNORECASE)
+_KMH: Final = re.compile(r"\b(?:km\s?/?\s?h|kph|kilomet(?:er|re)s? (?:per|an) hour)\b", re.IGNORECASE)
+_IN_KMH: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) km/h(?: \(\d{1,4} mph\))?")
 _SPEED: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) m/s(?![²2^\w/])(?: \([^()\n]{1,40}\))?")
 _LENGTH: Final = re.compile(r"(?<![\w.])(\d{1,5}\.\d{1,9}) m(?![\w/])")
 
 
-def pace_of(wish: str) -> SpeedUnit:
-    """The unit of speed for a person, by the words of their wish."""
-    return "mph" if _MPH.search(wish) else "km/h"
+def pace_of(wish: str, before: SpeedUnit = "km/h") -> SpeedUnit:
+    """The unit of speed for a person, by the words of their wish; the one before where they name none."""
+    return "mph" if _MPH.search(wish) else "km/h" if _KMH.search(wish) else before
 
 
 def passenger_units(text: str, unit: SpeedUnit = "km/h") -> str:
-    """A text with its m/s in the person's unit and its metres whole; what stood in brackets behind was that, too."""
+    """A text with its speeds in the person's unit and its metres whole; what stood in brackets behind was that, too."""
     told = _SPEED.sub(lambda match: people_speed(float(match[1]), unit), text)
+    told = _IN_KMH.sub(lambda match: people_speed(float(match[1]) * MPS_PER_KMH, unit), told)
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 

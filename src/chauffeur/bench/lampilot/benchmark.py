@@ -16,16 +16,16 @@ from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.goals import answered_rightly
-from chauffeur.bench.lampilot.metrics import points, ruler_named
 from chauffeur.bench.lampilot.policy_aid import aid_for
 from chauffeur.bench.lampilot.report import JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import PlainRequests, Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, PlanRequest
+from chauffeur.driving.judge.goals import answered_rightly
+from chauffeur.driving.judge.metrics import points, ruler_named
 from chauffeur.driving.rehearsal import label
-from chauffeur.driving.session import scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.prompts import Setting
 from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.version import __version__

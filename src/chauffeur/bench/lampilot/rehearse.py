@@ -9,8 +9,10 @@ from functools import cache
 from typing import Any
 
 from chauffeur.bench.lampilot.expert import variants
-from chauffeur.bench.lampilot.goals import HeldGoal, OvertakeGoal, make_goal
-from chauffeur.bench.lampilot.metrics import (
+from chauffeur.concept import Scenario
+from chauffeur.driving.judge.goals import HeldGoal, OvertakeGoal, make_goal
+from chauffeur.driving.judge.lampilot import GoalJudge
+from chauffeur.driving.judge.metrics import (
     ANY_STOP_M,
     COLLISION_WEIGHT,
     ORIGIN,
@@ -19,8 +21,6 @@ from chauffeur.bench.lampilot.metrics import (
     WEIGHTS,
     points,
 )
-from chauffeur.bench.lampilot.referee import GoalJudge
-from chauffeur.concept import Scenario
 from chauffeur.driving.rehearsal import RehearsedChoice, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed

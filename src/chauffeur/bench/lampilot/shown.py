@@ -11,9 +11,6 @@ from pydantic import ValidationError
 from chauffeur.bench.kernel.metrics import AnyRow
 from chauffeur.bench.kernel.pipeline import context_adapter
 from chauffeur.bench.lampilot.expert import expert_program
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S
-from chauffeur.bench.lampilot.metrics import points, ruler_named
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.report import NOTHING_DRIVEN
 from chauffeur.bench.lampilot.rollout import BASELINES, drive_policy, plan_adapter
 from chauffeur.bench.report.gallery import MakeCard
@@ -34,8 +31,12 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
+from chauffeur.driving.judge.goals import GIVE_UP_S, HOLD_S
+from chauffeur.driving.judge.lampilot import LampilotReferee
+from chauffeur.driving.judge.metrics import points, ruler_named
+from chauffeur.driving.planning import Planned
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import make_trip
+from chauffeur.driving.trips import make_trip
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
@@ -231,7 +232,7 @@ def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[Recor
     context = kept.context(row) or describe(observation)
     request = PlanRequest(Instruction(str(row["command"]), source="benchmark"), context, SystemMessage(""))
     made = plan or Plan(Thoughts(""), None, planner=str(row.get("planner", "")))
-    trip = make_trip(request, made, kept.verdicts(row), scenario, scenario.seed, episode, "")
+    trip = make_trip(Planned(made, kept.verdicts(row), request), scenario, scenario.seed, episode)
     return RecordedTrip(trip, episode.frames, scenario, final=episode.final), note
 
 

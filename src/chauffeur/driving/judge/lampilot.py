@@ -1,14 +1,15 @@
-"""Judges an episode on a highway world: goal, collision, signals for the scores. It watches and never acts."""
+"""LaMPilot's judge on highway worlds: the goal of a scenario, and its scores beside the judge of a free drive."""
 
 from __future__ import annotations
 
 from typing import Any, Protocol
 
-from chauffeur.bench.lampilot.goals import Goal, Ruling, make_goal
-from chauffeur.bench.lampilot.metrics import metrics_of
-from chauffeur.bench.lampilot.signals import SignalLog, Signals
 from chauffeur.concept import Metric, Outcome, Scenario
-from chauffeur.worlds.highway import RoadPerception
+from chauffeur.driving.judge.goals import Goal, Ruling, make_goal
+from chauffeur.driving.judge.metrics import metrics_of
+from chauffeur.driving.judge.referee import ActsReferee
+from chauffeur.driving.judge.signals import SignalLog, Signals
+from chauffeur.worlds.highway import HighwayWorld, RoadPerception
 
 
 class HasRoad(Protocol):
@@ -77,3 +78,22 @@ class LampilotReferee(GoalJudge):
         """Scores so far, by LaMPilot's own ruler."""
         row: dict[str, Any] = {"success": self.success, "signals": self.signals().as_row()}
         return metrics_of(row)
+
+
+class ScoredReferee(ActsReferee):
+    """The referee of a free drive, with LaMPilot's scores beside it."""
+
+    def __init__(self, world: HighwayWorld, *task: Any, **options: Any) -> None:
+        super().__init__(world, *task, **options)
+        self._view = world.perception()
+        self._log = SignalLog(self._view)
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        self._log.observe(self._view.instant())
+        super().observe()
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """Goals asked for and reached; LaMPilot's scores by its own ruler."""
+        scores = metrics_of({"success": self.success, "signals": self._log.signals().as_row()})
+        return (*super().metrics(), *scores)

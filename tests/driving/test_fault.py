@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.lampilot.signals import SignalLog, at_fault
 from chauffeur.concept import Command
+from chauffeur.driving.judge.signals import SignalLog, at_fault
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld, Instant
 from chauffeur.worlds.highway.core import layout as at

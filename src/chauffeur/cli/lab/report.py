@@ -45,13 +45,13 @@ def report(
     from chauffeur.bench.kernel.report import report_csv
     from chauffeur.bench.report.build import Choices, build_report, read_runs
     from chauffeur.bench.report.inspect_log import write_inspect_log
+    from chauffeur.bench.report.page import write_report_page
     from chauffeur.bench.report.text import render_markdown
-    from chauffeur.cli.bench_run import show_tables
     from chauffeur.cli.console import columns, path_text, plain, stdout
+    from chauffeur.cli.lab.bench_run import show_tables
     from chauffeur.concept import ConfigError
     from chauffeur.concept.needs import needs
     from chauffeur.driving.files import publish
-    from chauffeur.hmi.report_page import write_report_page
 
     if inspect is not None and len(runs) != 1:
         raise ConfigError("An Inspect log holds one run.", hint="Give --inspect with one RUN, once for each.")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chauffeur.bench.openloop.nuscenes import FUTURE, STEP_S
 from chauffeur.foreign.model_text import answer_in
 from chauffeur.foreign.numbers import NUMBER, numbers_in, plain_signs
 
@@ -17,6 +16,10 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
+STEP_S: Final = 0.5
+"""Time between waypoints: nuScenes' keyframes are taken at 2 Hz."""
+FUTURE: Final = 6
+"""Waypoints of 3 s, which the field's open-loop figures are about."""
 Pair = tuple[float, float, float | None]
 """x and y, m, and the time, s, where it is told."""
 

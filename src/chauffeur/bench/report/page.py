@@ -22,7 +22,8 @@ from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.drive_svg import SYMBOLS, draw_strip
 from chauffeur.hmi.payload import program_tokens
 
-_STYLES = ("trip.css", "panels.css", "report.css")
+_STYLES = ("scene.css", "trip.css", "panels.css")
+"""Of the trip page, whose look the report shares."""
 _DIRECTIONS = {
     "higher": '<span class="better" title="higher is better">↑<span class="hidden"> higher is better</span></span>',
     "lower": '<span class="better" title="lower is better">↓<span class="hidden"> lower is better</span></span>',
@@ -62,7 +63,7 @@ def write_report_page(path: Path, report: BenchReport) -> Path:
 
 def render_report(report: BenchReport) -> str:
     """The page of a report as text."""
-    style = "\n".join(asset(name) for name in _STYLES)
+    style = "\n".join((*map(asset, _STYLES), asset("report.css", "chauffeur.bench.report")))
     real = report.simulated
     tables = [(f"t{n}", table.spec.title, _section(f"t{n}", table, real)) for n, table in enumerate(report.tables)]
     sections = [
@@ -75,7 +76,7 @@ def render_report(report: BenchReport) -> str:
     ]
     judge = f'<p class="judge"><b>Judge</b> {_text(report.judge)}</p>' if report.judge else ""
     return fill(
-        asset("report.html"),
+        asset("report.html", "chauffeur.bench.report"),
         {
             "policy": html.escape(f"default-src 'none'; style-src {content_hash(style)}"),
             "style": style,

@@ -16,9 +16,9 @@ from typing import Annotated, Any, Final, get_type_hints
 import typer
 from typer.core import TyperGroup
 
-from chauffeur.cli.bench_run import merge_folders, named_values, run_named
 from chauffeur.cli.examples import help_text, help_text_or_none
-from chauffeur.cli.generated import command_taking, options_of
+from chauffeur.cli.lab.bench_run import merge_folders, run_named
+from chauffeur.cli.lab.generated import command_taking, options_of
 from chauffeur.cli.options import (
     BaseUrl,
     BenchOptions,
@@ -30,6 +30,7 @@ from chauffeur.cli.options import (
     ShardPart,
     Workers,
 )
+from chauffeur.cli.parts import named_values
 from chauffeur.concept import ConfigError
 from chauffeur.concept.registry import load_plugin, plugin_names
 

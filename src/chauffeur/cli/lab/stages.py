@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from chauffeur.cli.bench_progress import LINE_EVERY_S
+from chauffeur.cli.lab.bench_progress import LINE_EVERY_S
 
 if TYPE_CHECKING:
     from rich.console import Console

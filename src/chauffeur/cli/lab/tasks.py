@@ -13,8 +13,8 @@ import typer
 
 from chauffeur.bench.tasks import SCENES
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.generated import options_of, taking
 from chauffeur.cli.interrupts import stopped_kindly
+from chauffeur.cli.lab.generated import options_of, taking
 from chauffeur.models.tasks import TRAINED
 
 train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Train models of our own.")
@@ -32,8 +32,8 @@ def add_task(app: typer.Typer, name: str, make: Callable[..., Any], examples: st
         from chauffeur.bench.kernel.task import TextTable
         from chauffeur.cli.console import plain, stdout
         from chauffeur.cli.failures import FAILED
-        from chauffeur.cli.stages import stages_shown
-        from chauffeur.cli.tables import show_table
+        from chauffeur.cli.lab.stages import stages_shown
+        from chauffeur.cli.lab.tables import show_table
 
         console = stdout()
         with stopped_kindly(console, given.get("out")), stages_shown(console) as told:

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, make_goal
-from chauffeur.bench.lampilot.metrics import PAPER, RULERS, metrics_of, points
 from chauffeur.concept import ConfigError, Scenario, ScenarioError
+from chauffeur.driving.judge.goals import GIVE_UP_S, HOLD_S, make_goal
+from chauffeur.driving.judge.metrics import PAPER, RULERS, metrics_of, points
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from chauffeur.cli.interrupts import stopped_kindly
+from chauffeur.cli.parts import planner_options
 from chauffeur.concept import ConfigError
 
 if TYPE_CHECKING:
@@ -26,16 +26,6 @@ _NAME: Final = 30
 """Longest planner name that leaves a table its columns; of a longer one the end is shown."""
 UNFINISHED: Final = 3
 """Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
-
-
-def planner_options(spec: str, base_url: str | None) -> dict[str, Any]:
-    """Options of a planner in a benchmark.
-
-    A language model is asked whole replies, which cost less to read than pieces nobody looks at, and does not try again
-    by itself: the run does, which sees what all calls meet.
-    """
-    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    return options | {"attempts": 1, "stream": False} if spec.startswith("openai/") else options
 
 
 def _effort(given: Mapping[str, Any]) -> Effort:
@@ -82,8 +72,8 @@ def run_named(name: str, make: Any, options: Mapping[str, Any], given: Mapping[s
     from chauffeur.bench.kernel.run import BenchRun
     from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.kernel.stages import made_by
-    from chauffeur.cli.bench_progress import shown
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.lab.bench_progress import shown
 
     console, work = stdout(), _effort(given)
     part = WHOLE if given["shard"] is None else Shard.parse(given["shard"], os.environ)
@@ -129,20 +119,6 @@ def merge_folders(out: Path, shards: Sequence[Path], name: str, make: Any, optio
     console.print(f"Rows: {out / 'results.jsonl'}", soft_wrap=True)
 
 
-def named_values(given: Sequence[str]) -> dict[str, Any]:
-    """Values of `-o NAME=VALUE`: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
-    found: dict[str, Any] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise ConfigError(f"{text!r} is no option.", hint="Write -o NAME=VALUE.")
-        try:
-            found[name] = json.loads(value)
-        except ValueError:
-            found[name] = value
-    return found
-
-
 def _show(console: Console, stages: StageStore[Any], folder: Path, rows: list[Row], planner: str) -> None:
     """The tables of a run, and what its benchmark says below them."""
     from chauffeur.bench.kernel.benchmark import Concludes
@@ -165,7 +141,7 @@ def _show(console: Console, stages: StageStore[Any], folder: Path, rows: list[Ro
 def show_tables(console: Console, found: Iterable[ResultTable]) -> None:
     """The kernel's tables."""
     from chauffeur.cli.console import plain
-    from chauffeur.cli.tables import show_table
+    from chauffeur.cli.lab.tables import show_table
 
     for table in found:
         show_table(
