@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
 from chauffeur.concept import ConfigError
 from chauffeur.concept.lab import needs_lab
@@ -17,13 +16,10 @@ from chauffeur.concept.lab import needs_lab
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
 
-EXAMPLES = help_text("check")
-
 check_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Check whether a plug-in of your own keeps its contract.",
-    epilog=EXAMPLES,
 )
 
 
@@ -32,7 +28,7 @@ def check() -> None:
     """Check whether a plug-in of your own keeps its contract."""
 
 
-@check_app.command(epilog=EXAMPLES)
+@check_app.command()
 def world(
     name: Annotated[
         str, typer.Argument(metavar="MODULE[:NAME]", help="The world's class or factory, or a registered name.")
@@ -50,7 +46,7 @@ def world(
     _tell(check_world(_world_class(name), _scenario(name, scenario, config, seed)))
 
 
-@check_app.command(epilog=EXAMPLES)
+@check_app.command()
 def planner(
     name: Annotated[
         str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:NAME; then /ARGUMENT.")
@@ -74,7 +70,7 @@ def planner(
     _tell(check_planner(asked))
 
 
-@check_app.command(epilog=EXAMPLES)
+@check_app.command()
 def executor(
     name: Annotated[str, typer.Argument(metavar="MODULE:NAME", help="The executor's class or factory.")],
     policy: Annotated[str, typer.Option(metavar="MODULE:NAME", help="A policy of its kind to try it with.")],
@@ -92,7 +88,7 @@ def executor(
     _tell(check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0)))
 
 
-@check_app.command(epilog=EXAMPLES)
+@check_app.command()
 def benchmark(
     name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:NAME.")],
     option: BenchOptions = None,

@@ -7,13 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from chauffeur.describe.services import Position, Surroundings
     from chauffeur.describe.services.surroundings import Row
-
-EXAMPLES = help_text("context")
 
 
 def context(

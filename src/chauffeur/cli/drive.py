@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile
 
 if TYPE_CHECKING:
     from chauffeur.driving.recording import RecordedTrip
-
-EXAMPLES = help_text("drive")
 
 SEEN: Final = (
     "The planner is told what BEV-LLM sees in rendered pictures; checks and safety filter use the world's own state."

@@ -26,7 +26,7 @@ from chauffeur.cli import (
 )
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.check import check_app
-from chauffeur.cli.examples import help_text
+from chauffeur.cli.examples import give_examples
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
@@ -35,10 +35,6 @@ from chauffeur.cli.vehicle import vehicle_app
 from chauffeur.concept.lab import LAB_COMMANDS, has_lab, needs_lab
 from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.version import __version__
-
-EXAMPLES = help_text("main")
-
-SHOW_EXAMPLES = help_text("main SHOW_EXAMPLES")
 
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
 """What somebody comes for; the headings of `chauffeur --help`."""
@@ -49,6 +45,10 @@ COMMANDS: Final = "chauffeur.commands"
 
 class ChauffeurGroup(FriendlyGroup):
     """The commands written here, and one for each that an installed package registers."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        give_examples(self)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all of them."""
@@ -77,13 +77,11 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=EXAMPLES,
 )
 show_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Show scenarios, driving APIs, policies, the context of a place, a trip's page, what is heard, what is seen.",
-    epilog=SHOW_EXAMPLES,
 )
 
 
@@ -103,23 +101,23 @@ def chauffeur(
     del version
 
 
-app.command(epilog=drive.EXAMPLES, rich_help_panel=DRIVE)(drive.drive)
-app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
-app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
+app.command(rich_help_panel=DRIVE)(drive.drive)
+app.command(rich_help_panel=DRIVE)(talk.talk)
+app.command(rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
-app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK)(replay.replay)
+app.command(rich_help_panel=LOOK)(replay.replay)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
-app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK)(doctor.doctor)
-show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
-show_app.command(epilog=apis.EXAMPLES)(apis.apis)
-show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
-show_app.command(epilog=context.EXAMPLES)(context.context)
-show_app.command(epilog=meaning.EXAMPLES)(meaning.meaning)
-show_app.command(epilog=page.EXAMPLES)(page.page)
-show_app.command(epilog=camera.EXAMPLES)(camera.camera)
-show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
-show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
+app.command(rich_help_panel=LOOK)(doctor.doctor)
+show_app.command()(scenarios.scenarios)
+show_app.command()(apis.apis)
+show_app.command("policies")(policies.show_policies)
+show_app.command()(context.context)
+show_app.command()(meaning.meaning)
+show_app.command()(page.page)
+show_app.command()(camera.camera)
+show_app.command()(unmasking.unmasking)
+show_app.command("speech")(hear.hear)
 
 if has_lab():
     from chauffeur.cli.lab import commands as lab

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples, help_text
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -17,7 +15,6 @@ if TYPE_CHECKING:
     from chauffeur.memory.policies import Merged, PolicyEntry, PolicyRepository, Rejected
 
 policies_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Policy repositories (programs that did well, learned from feedback): describe, prune, share.",
@@ -26,12 +23,8 @@ policies_app = typer.Typer(
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="A program's name as it is called, or its id.")]
 
-SHOW_EXAMPLES = help_text("policies SHOW_EXAMPLES")
 
-EXAMPLES = help_text("policies")
-
-
-@policies_app.callback(epilog=EXAMPLES)
+@policies_app.callback()
 def policies() -> None:
     """Policy repositories."""
 

@@ -10,12 +10,6 @@ import typer
 if TYPE_CHECKING:
     from chauffeur.driving.recording import RecordedTrip
 
-EXAMPLES = """
-Examples:
-
-    chauffeur replay trips/hurry/trip.mcap
-"""
-
 
 def replay(
     recording: Annotated[Path, typer.Argument(metavar="TRIP.mcap", help="The recorded trip.")],

@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile, Wishes
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
-
-EXAMPLES = help_text("talk")
 
 STOPPED_WITH_CTRL_C: Final = 130
 _QUIET_ROAD: Final = "overtake"

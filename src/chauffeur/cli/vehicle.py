@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from chauffeur.cli import egodriver
-from chauffeur.cli.examples import WithExamples, help_text
-from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
+from chauffeur.cli.vehicle_drive import drive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,13 +17,10 @@ if TYPE_CHECKING:
     from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
 
 vehicle_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Vehicles behind ROS: what is asked of them, and how the way to them is.",
 )
-
-EXAMPLES = help_text("vehicle")
 
 _NOT_FROM_HERE: Final = "Only a vehicle with Autoware.AI behind rosbridge is engaged and disengaged from here."
 _ON_ITS_OWN_SCREEN: Final = "Use the vehicle's own screen."
@@ -33,7 +29,7 @@ File = Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's config
 Wait = Annotated[float, typer.Option(min=0.5, max=60.0, help="Seconds to look for the vehicle.")]
 
 
-@vehicle_app.callback(epilog=EXAMPLES)
+@vehicle_app.callback()
 def vehicle() -> None:
     """Vehicles behind ROS."""
 
@@ -152,8 +148,8 @@ def watch(
         car.close()
 
 
-vehicle_app.command(epilog=DRIVE_EXAMPLES)(drive)
-vehicle_app.command(epilog=egodriver.EXAMPLES)(egodriver.egodriver)
+vehicle_app.command()(drive)
+vehicle_app.command()(egodriver.egodriver)
 
 
 @vehicle_app.command()

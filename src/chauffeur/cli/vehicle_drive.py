@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
 
 if TYPE_CHECKING:
     pass
-
-DRIVE_EXAMPLES: Final = help_text("vehicle_drive DRIVE_EXAMPLES")
 
 _STOPPED_WITH_CTRL_C: Final = 130
 

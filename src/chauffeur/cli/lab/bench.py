@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, get_type_hints
 import typer
 from typer.core import TyperGroup
 
-from chauffeur.cli.examples import help_text, help_text_or_none
+from chauffeur.cli.examples import help_text_or_none
 from chauffeur.cli.lab.bench_run import merge_folders, run_named
 from chauffeur.cli.lab.generated import command_taking, options_of
 from chauffeur.cli.options import (
@@ -140,7 +140,7 @@ def command_of(name: str) -> Any:
         run_named(name, make, {option.name: given[option.name] for option in own}, given)
 
     about = _about(name)[1] if name in _ABOUT else _first_line(make) or _about(name)[1]
-    return command_taking(name, [*own, *shared], run, help=about, epilog=help_text_or_none(f"bench_{name}"))
+    return command_taking(name, [*own, *shared], run, help=about, epilog=help_text_or_none(f"bench {name}"))
 
 
 def _shared(
@@ -188,7 +188,7 @@ def bench() -> None:
     """Benchmarks."""
 
 
-@bench_app.command(epilog=help_text("bench_merge"), short_help="Put the shards of a run together.")
+@bench_app.command(short_help="Put the shards of a run together.")
 def merge(
     out: Annotated[Path, typer.Argument(help="Folder for the whole run.")],
     shards: Annotated[list[Path], typer.Argument(help="Folders of all its shards.")],

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
 if TYPE_CHECKING:
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
 
     from chauffeur.bench.lampilot.coaching import Coached
     from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
-
-EXAMPLES = help_text("coach")
 
 
 _DEMO = "demo12"

@@ -7,10 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
-
-EXAMPLES = help_text("coach_town")
 
 
 def coach_town(

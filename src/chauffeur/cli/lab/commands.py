@@ -4,36 +4,28 @@ from __future__ import annotations
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.lab import coach, coach_town, report
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.lab.tasks import add_task, scenes_app, train_app
 from chauffeur.cli.policies import policies_app
 from chauffeur.models.tasks import adapt_vlm, quantise_vlm
 
-BENCH_EXAMPLES = help_text("main BENCH_EXAMPLES")
-
-MODEL_EXAMPLES = help_text("main MODEL_EXAMPLES")
-
 model_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Models of our own: train, fine-tune, quantise; and the policies learned from feedback.",
-    epilog=MODEL_EXAMPLES,
 )
 
 
 def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
     """Add the lab's commands to `chauffeur`, under the headings of its help."""
-    app.command(epilog=report.EXAMPLES, rich_help_panel=look)(report.report)
-    app.add_typer(bench_app, name="bench", rich_help_panel=measure, epilog=BENCH_EXAMPLES)
-    bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
-    bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(
-        coach_town.coach_town
-    )
-    bench_app.add_typer(scenes_app, name="scenes", epilog=help_text("scenes generate"))
+    app.command(rich_help_panel=look)(report.report)
+    app.add_typer(bench_app, name="bench", rich_help_panel=measure)
+    bench_app.command(short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
+    bench_app.command("coach-town", short_help="Human feedback in towns (Tab. V).")(coach_town.coach_town)
+    bench_app.add_typer(scenes_app, name="scenes")
     app.add_typer(model_app, name="model", rich_help_panel=build)
-    model_app.add_typer(train_app, name="train", epilog=help_text("train onboard"))
-    add_task(model_app, "adapt-vlm", adapt_vlm, "adapt_vlm")
-    add_task(model_app, "quantise-vlm", quantise_vlm, "quantise_vlm")
+    model_app.add_typer(train_app, name="train")
+    add_task(model_app, "adapt-vlm", adapt_vlm)
+    add_task(model_app, "quantise-vlm", quantise_vlm)
     model_app.add_typer(policies_app, name="policies")

@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from rich.console import Console
-
-EXAMPLES = help_text("report")
 
 
 def report(

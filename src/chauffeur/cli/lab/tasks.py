@@ -12,7 +12,6 @@ from typing import Any
 import typer
 
 from chauffeur.bench.tasks import SCENES
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.interrupts import stopped_kindly
 from chauffeur.cli.lab.generated import options_of, taking
 from chauffeur.models.tasks import TRAINED
@@ -23,7 +22,7 @@ scenes_app = typer.Typer(
 )
 
 
-def add_task(app: typer.Typer, name: str, make: Callable[..., Any], examples: str) -> None:
+def add_task(app: typer.Typer, name: str, make: Callable[..., Any]) -> None:
     """Add the command of a function that does long work and gives a TaskResult."""
     parameters = inspect.signature(make).parameters.values()
     first = [one.name for one in parameters if one.kind is inspect.Parameter.POSITIONAL_ONLY]
@@ -53,10 +52,10 @@ def add_task(app: typer.Typer, name: str, make: Callable[..., Any], examples: st
 
     about = (inspect.getdoc(make) or "").partition("\n\n")[0]
     options = [one for one in options_of(make) if one.name != "told"]
-    app.command(name, help=about, epilog=help_text(examples))(taking(options, run))
+    app.command(name, help=about)(taking(options, run))
 
 
 for _name, _make in TRAINED.items():
-    add_task(train_app, _name, _make, f"train {_name}")
+    add_task(train_app, _name, _make)
 for _name, _make in SCENES.items():
-    add_task(scenes_app, _name, _make, f"scenes {_name}")
+    add_task(scenes_app, _name, _make)
