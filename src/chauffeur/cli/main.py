@@ -25,7 +25,7 @@ from chauffeur.cli import (
     unmasking,
 )
 from chauffeur.cli.audit import audit_app
-from chauffeur.cli.check import check_app
+from chauffeur.cli.check import check
 from chauffeur.cli.examples import give_examples
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
@@ -52,7 +52,9 @@ class ChauffeurGroup(FriendlyGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all of them."""
-        known = super().list_commands(ctx)
+        panels = [DRIVE, LOOK, MEASURE, BUILD]
+        commands: dict[str, Any] = self.commands
+        known = sorted(super().list_commands(ctx), key=lambda name: panels.index(commands[name].rich_help_panel))
         return [*known, *(name for name in plugin_names(COMMANDS) if name not in known)]
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -127,7 +129,7 @@ if has_lab():
 app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
 app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
-app.add_typer(check_app, name="check", rich_help_panel=BUILD)
+app.command(rich_help_panel=BUILD)(check)
 
 
 def run() -> None:

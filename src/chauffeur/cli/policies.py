@@ -42,10 +42,9 @@ def show_policies(
 
 
 def _list(folder: Path, query: str) -> None:
-    from rich.table import Table
     from rich.text import Text
 
-    from chauffeur.cli.console import path_text, plain, stdout
+    from chauffeur.cli.console import path_text, plain, stdout, table
     from chauffeur.memory.policies import CRITIC_LABELS
 
     console = stdout()
@@ -59,21 +58,19 @@ def _list(folder: Path, query: str) -> None:
         )
         likeness = {one.entry.id: one.similarity for one in recalled}
         entries = tuple(sorted(entries, key=lambda entry: -likeness.get(entry.id, 0.0)))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name in ("program", "learned for", "road", "judged by", "score", *(("near",) if query else ())):
-        table.add_column(name, justify="right" if name in ("score", "near") else "left", overflow="fold")
-    for entry in entries:
-        who = "person" if entry.judged_by == "person" else "evaluator (not a person)"
-        near = (f"{likeness.get(entry.id, 0.0):.2f}",) if query else ()
-        table.add_row(
+    lines = [
+        (
             Text(f"{entry.callable_name}()", "bold"),
             plain(entry.command),
             plain(entry.world),
-            who,
+            "person" if entry.judged_by == "person" else "evaluator (not a person)",
             _score(entry),
-            *near,
+            *((f"{likeness.get(entry.id, 0.0):.2f}",) if query else ()),
         )
-    console.print(table)
+        for entry in entries
+    ]
+    heads = ("program", "learned for", "road", "judged by", "score", *(("near",) if query else ()))
+    console.print(table(heads, lines, right=("score", "near")))
     console.print(path_text(folder), plain(f"{len(entries)} programs, sha256 {repository.digest[:12]}"))
     for label in repository.labels or (CRITIC_LABELS["person"],) * bool(entries):
         console.print(plain(label), style="bold")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from chauffeur.cli.lab import coach, coach_town, report
+from chauffeur.cli.lab import coach, report
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.lab.tasks import add_task, scenes_app, train_app
 from chauffeur.cli.policies import policies_app
@@ -21,8 +21,7 @@ def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
     """Add the lab's commands to `chauffeur`, under the headings of its help."""
     app.command(rich_help_panel=look)(report.report)
     app.add_typer(bench_app, name="bench", rich_help_panel=measure)
-    bench_app.command(short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
-    bench_app.command("coach-town", short_help="Human feedback in towns (Tab. V).")(coach_town.coach_town)
+    bench_app.command(short_help="Human feedback: items, or towns (Tab. IV, V).")(coach.coach)
     bench_app.add_typer(scenes_app, name="scenes")
     app.add_typer(model_app, name="model", rich_help_panel=build)
     model_app.add_typer(train_app, name="train")
