@@ -53,7 +53,7 @@ class ChauffeurGroup(FriendlyGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all of them."""
         panels = [DRIVE, LOOK, MEASURE, BUILD]
-        commands: dict[str, Any] = self.commands
+        commands: Any = self.commands
         known = sorted(super().list_commands(ctx), key=lambda name: panels.index(commands[name].rich_help_panel))
         return [*known, *(name for name in plugin_names(COMMANDS) if name not in known)]
 
