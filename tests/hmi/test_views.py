@@ -120,8 +120,8 @@ def test_what_the_shield_did_is_told_in_stretches() -> None:
     ]
     labels = [event.label for event in events_of(trip) if event.kind == "shield"]
     assert len(labels) == 3
-    assert labels[0].startswith("Shield (lane not free, 1.0 s): steering ")
-    assert labels[2].endswith("m/s². Too close to the car 9 m ahead to ask for more.")
+    assert labels[0] == "Shield, 1.0 s: lane not free. The lane is not free: a car is beside."
+    assert labels[2].endswith("Too close to the car 9 m ahead to ask for more.")
 
 
 def test_a_pause_ends_a_stretch_only_if_it_is_long() -> None:

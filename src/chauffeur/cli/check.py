@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
@@ -12,6 +11,7 @@ import typer
 from chauffeur.cli.options import BaseUrl, BenchOptions
 from chauffeur.concept import ConfigError
 from chauffeur.concept.lab import needs_lab
+from chauffeur.concept.registry import load_plugin, made, module_at, plugin_at, plugin_names
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
@@ -71,23 +71,17 @@ def check(
 def _of_planner(name: str, base_url: str | None) -> Sequence[ConformanceFinding]:
     from chauffeur.cli.parts import planner_options
     from chauffeur.driving.conformance import check_planner
-    from chauffeur.planners.registry import make_planner, planner_from
+    from chauffeur.planners.registry import make_planner
 
-    options = planner_options(name, base_url)
-    module, _, argument = name.partition("/")
-    own = ":" in module
-    return check_planner(
-        planner_from(_named(module), module, argument, **options) if own else make_planner(name, **options)
-    )
+    return check_planner(make_planner(name, **planner_options(name, base_url)))
 
 
 def _of_executor(name: str, policy: str, scenario: str) -> Sequence[ConformanceFinding]:
-    from chauffeur.concept.registry import made
     from chauffeur.driving.conformance import check_executor
 
     if not policy:
         raise ConfigError("An executor is tried with a policy of its kind.", hint="Name one: --policy MODULE:NAME.")
-    tried = _named(policy)
+    tried = plugin_at(policy)
     tried = made("policy", policy, tried) if isinstance(tried, type) or not hasattr(tried, "kind") else tried
     return check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0))
 
@@ -100,7 +94,7 @@ def _of_benchmark(name: str, option: Sequence[str]) -> Sequence[ConformanceFindi
 
     given = named_values(option)
     own = ":" in name
-    return check_benchmark(benchmark_from(_named(name), name, **given) if own else make_benchmark(name, **given))
+    return check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given))
 
 
 def _tell(findings: Sequence[ConformanceFinding]) -> None:
@@ -122,34 +116,10 @@ def _tell(findings: Sequence[ConformanceFinding]) -> None:
         raise typer.Exit(FAILED)
 
 
-def _module(name: str) -> ModuleType:
-    """A module by its name, found as `python -m` finds it. Raises ConfigError."""
-    import importlib
-    import os
-    import sys
-
-    if os.getcwd() not in sys.path:  # noqa: PTH109 - where the person stands, as `python -m` has it
-        sys.path.insert(0, os.getcwd())  # noqa: PTH109
-    try:
-        return importlib.import_module(name)
-    except (ImportError, ValueError, TypeError) as error:
-        raise ConfigError(f"The module {name!r} cannot be loaded: {error}.", hint="Check its name.") from error
-
-
-def _named(name: str) -> Any:
-    """What `module:NAME` names. Raises ConfigError."""
-
-    module_name, _, own = name.partition(":")
-    module = _module(module_name)
-    if not own or not hasattr(module, own):
-        raise ConfigError(f"{module_name} has no {own!r}.", hint="Say MODULE:NAME.")
-    return getattr(module, own)
-
-
 def _maker(kind: str, name: str) -> Callable[..., Any]:
     """The class or function at `module:NAME`: a check makes several of its kind. Raises ConfigError."""
 
-    found = _named(name)
+    found = plugin_at(name)
     if not callable(found):
         raise ConfigError(f"{name!r} is a {type(found).__name__}, and makes no {kind}.", hint="Name its class.")
     return found
@@ -157,14 +127,13 @@ def _maker(kind: str, name: str) -> Callable[..., Any]:
 
 def _world_class(name: str) -> Callable[[], Any]:
     """What makes the world at `module:NAME`, the only one of a module, or a registered one. Raises ConfigError."""
-    from chauffeur.concept.registry import load_plugin, plugin_names
 
     module_name, _, class_name = name.partition(":")
     if not class_name and module_name in plugin_names("chauffeur.worlds"):
         return load_plugin("chauffeur.worlds", module_name)
     if class_name:
         return _maker("world", name)
-    module = _module(module_name)
+    module = module_at(module_name)
     own = [
         one
         for one in vars(module).values()

@@ -18,11 +18,13 @@ from chauffeur.cli import (
     hear,
     meaning,
     page,
+    plugins,
     policies,
     replay,
     scenarios,
     talk,
     unmasking,
+    what_if,
 )
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.check import check
@@ -108,9 +110,15 @@ app.command(rich_help_panel=DRIVE)(talk.talk)
 app.command(rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
-app.command(rich_help_panel=LOOK)(replay.replay)
+app.command(rich_help_panel=LOOK, short_help="A recorded trip again, bit for bit.")(replay.replay)
+app.command(
+    "what-if",
+    rich_help_panel=LOOK,
+    short_help="A recorded trip with another planner, side by side.",
+)(what_if.what_if)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
-app.command(rich_help_panel=LOOK)(doctor.doctor)
+app.command(rich_help_panel=LOOK, short_help="Check this installation.")(doctor.doctor)
+app.command(rich_help_panel=LOOK, short_help="What is installed, and of whom.")(plugins.plugins)
 show_app.command()(scenarios.scenarios)
 show_app.command()(apis.apis)
 show_app.command("policies")(policies.show_policies)

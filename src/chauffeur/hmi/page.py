@@ -21,6 +21,10 @@ _STYLES = ("scene.css", "trip.css", "panels.css")
 _SCRIPTS = ("panels.js", "drawer.js", "stage.js", "charts.js", "player.js")
 
 
+_OUTCOME = {"outcome": "label", "sign": "sign", "tone": "tone", "account": "account"}
+"""Slots of the headline, and what fills them."""
+
+
 def write_page(path: Path, recorded: RecordedTrip) -> Path:
     """Write the page of a trip; the file appears whole or not at all.
 
@@ -46,7 +50,7 @@ def render_page(recorded: RecordedTrip) -> str:
             "policy": html.escape(policy),
             "title": html.escape(f"“{printable(payload['wish'])}” – {payload['outcome']['label']}"),
             "wish": html.escape(printable(payload["wish"])),
-            "outcome": html.escape(payload["outcome"]["label"]),
+            **{name: html.escape(printable(payload["outcome"][of])) for name, of in _OUTCOME.items()},
             "simulated": html.escape(payload["simulated"]),
             "style": style,
             "script": script,

@@ -17,6 +17,7 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.policy_aid import aid_for
+from chauffeur.bench.lampilot.rehearsal import label
 from chauffeur.bench.lampilot.report import JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import PlainRequests, Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
@@ -24,7 +25,6 @@ from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, PlanRequest
 from chauffeur.driving.judge.goals import answered_rightly
 from chauffeur.driving.judge.metrics import points, ruler_named
-from chauffeur.driving.rehearsal import label
 from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.prompts import Setting
 from chauffeur.safety.shield import SHIELD_VERSION

@@ -212,7 +212,7 @@ class _Teller:
             code = Syntax(source, "python", theme="ansi_dark", background_color="default", word_wrap=True)
             self._console.print(Padding(code, (0, 0, 0, 2)))
         self._console.print(line)
-        for told in (*words.left_out_words(trip), *words.cause_words(trip.causes)):
+        for told in (f"“{trip.instruction.text}”{words.account_words(trip)}", *words.cause_words(trip.causes)):
             self._console.print(Padding(plain(told), (0, 0, 0, 4)))
         if attempt.recorded.frames:
             self._drive(attempt)
