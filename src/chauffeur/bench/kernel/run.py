@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -163,9 +164,10 @@ class BenchRun:
             except BaseExceptionGroup as group:
                 raise first_error(group) from group
             finally:
-                for store in self.stages.stores:
+                for store in (*self.stages.stores, self.stages.live):
                     store.close()
             rows = score(self.folder, self.stages)
+            self.stages.live.clear()
         asked = [self.stages.outcome(item) for item in self.items if self.stages.asked(item)]
         vain = [one for one in asked if one.undriven]
         if self.halt is None and self.manifest.shard == WHOLE and 0 < len(vain) == len(asked):
@@ -190,7 +192,10 @@ class BenchRun:
         whole = False
         try:
             await engine.start()
-            pipeline = Pipeline(self.stages, engine, caller, scribe, watch, effort.concurrency)
+            self.stages.live.clear()
+            pipeline = Pipeline(
+                self.stages, engine, caller, scribe, watch, effort.concurrency, partial(rows_of, self.stages)
+            )
             await pipeline.work(broken)
             whole = True
         finally:
@@ -222,6 +227,15 @@ class BenchRun:
         )
 
 
+def rows_of(stages: StageStore[Any], item: Any) -> list[Row]:
+    """An item's rows, from what is stored of it; what only all rows together tell is not in them."""
+    manifest = stages.manifest
+    about: Row = {"bench": manifest.bench, "chauffeur": __version__, "labels": list(manifest.labels)}
+    if stages.benchmark.asks:
+        about |= {"planner": manifest.config.get("planner", ""), "model": manifest.model}
+    return [{"item": item.id} | about | _fields(row) for row in stages.benchmark.rows(stages.outcome(item))]
+
+
 def score(folder: Path, stages: StageStore[Any]) -> list[Row]:
     """All rows of a run, from what is stored; written to `results.jsonl`, with `table.md`, `report.json` and
     `provenance.json`.
@@ -230,14 +244,7 @@ def score(folder: Path, stages: StageStore[Any]) -> list[Row]:
         DataError: They cannot be written.
     """
     benchmark, manifest = stages.benchmark, stages.manifest
-    about: Row = {"bench": benchmark.id, "chauffeur": __version__, "labels": list(manifest.labels)}
-    if benchmark.asks:
-        about |= {"planner": manifest.config.get("planner", ""), "model": manifest.model}
-    found = [
-        {"item": item.id} | about | _fields(row)
-        for item in manifest.items
-        for row in benchmark.rows(stages.outcome(item))
-    ]
+    found = [row for item in manifest.items for row in rows_of(stages, item)]
     if isinstance(benchmark, ComparesRows):
         found = [dict(row) for row in benchmark.together(found)]
     lines = [json.dumps(row, ensure_ascii=True) for row in found]

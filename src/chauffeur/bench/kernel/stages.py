@@ -22,6 +22,8 @@ T = TypeVar("T", bound=BenchItem)
 PLAN: Final = "plan.json"
 """A manifest's file in the folder of its run."""
 _MADE: Final = "made"
+LIVE: Final = "live.jsonl"
+"""File of the rows of a run that has not been scored yet."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,8 @@ class StageStore(Generic[T]):
         contexts: C by scene.
         plans: Answers, or why there is none, by item.
         rollouts: What the jobs gave, by the key of what decided it.
+        systems: System messages that models were given, by their hash; answers name them.
+        live: Rows of the items done so far, to be looked at while the run goes on; `results.jsonl` takes its place.
     """
 
     benchmark: Benchmark[T]
@@ -174,6 +178,8 @@ class StageStore(Generic[T]):
     contexts: RowStore
     plans: RowStore
     rollouts: RowStore
+    systems: RowStore
+    live: RowStore
     _jobs: dict[str, tuple[Row | None, BenchJob | None]] = field(
         default_factory=dict[str, "tuple[Row | None, BenchJob | None]"]
     )
@@ -187,12 +193,14 @@ class StageStore(Generic[T]):
             RowStore(folder / "contexts.jsonl", "sample"),
             RowStore(folder / "generate.jsonl", "item"),
             RowStore(folder / "rollout.jsonl", "key"),
+            RowStore(folder / "systems.jsonl", "sha256"),
+            RowStore(folder / LIVE, "item", durable=False),
         )
 
     @property
     def stores(self) -> tuple[RowStore, ...]:
-        """All of them."""
-        return self.contexts, self.plans, self.rollouts
+        """All that a resume reads."""
+        return self.contexts, self.plans, self.rollouts, self.systems
 
     def answer(self, item: T) -> Row | None:
         """The item's answer; None when there is none (yet)."""
