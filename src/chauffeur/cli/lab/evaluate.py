@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.lab.bench_run import UNFINISHED, effort
 from chauffeur.cli.options import BaseUrl, BenchOptions, Concurrency, MaxRequests, MaxUsd, Price, Workers
 from chauffeur.cli.parts import planner_options
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from chauffeur.bench.evaluation.parts import PlannedPart, Profile
     from chauffeur.bench.kernel.pipeline import Watch
     from chauffeur.bench.kernel.run import BenchRun
-
-EXAMPLES = help_text("evaluate")
 
 
 def evaluate(
@@ -87,11 +84,11 @@ def _shown(console: Console, part: PlannedPart, run: BenchRun) -> Generator[Watc
 
 def _options(given: list[str]) -> dict[str, dict[str, Any]]:
     """Options of benchmarks, `NAME.OPTION=VALUE`, by benchmark. Raises ConfigError."""
-    from chauffeur.cli.check import read_options
+    from chauffeur.cli.parts import named_values
     from chauffeur.concept import ConfigError
 
     found: dict[str, dict[str, Any]] = {}
-    for name, value in read_options(given).items():
+    for name, value in named_values(given).items():
         bench, dot, own = name.partition(".")
         if not dot or not own:
             raise ConfigError(f"{name!r} names no benchmark.", hint="Write -o BENCHMARK.NAME=VALUE.")
