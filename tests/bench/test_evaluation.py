@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import pytest
 from coached_data import server_module
-from small_run import LEFT, Inline, make_data, quiet
 
 from chauffeur.bench.evaluation.card import ScoreCard, read_card
 from chauffeur.bench.evaluation.compare import CardComparison, compare_cards
@@ -23,6 +22,7 @@ from chauffeur.bench.kernel.metrics import TableSpec, share
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.concept import ConfigError, DataError, Plan, PlannerError, Program, Thoughts
 from chauffeur.concept.registry import plugin_names
+from small_run import LEFT, Inline, make_data, quiet
 
 ITEMS = 6
 IN_THIS_PROCESS = Effort(workers=1, engine=Inline)

@@ -1,11 +1,22 @@
-"""What the lab adds to `chauffeur`: `evaluate`, `bench`, `report`, `model`."""
+"""What the lab adds to `chauffeur`: `evaluate`, `bench`, `view`, `report`, `model`."""
 
 from __future__ import annotations
 
 import typer
 
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.lab import adapt_vlm, coach, coach_town, evaluate, quantise_vlm, report, scenes, scenes_frames, train
+from chauffeur.cli.lab import (
+    adapt_vlm,
+    coach,
+    coach_town,
+    evaluate,
+    quantise_vlm,
+    report,
+    scenes,
+    scenes_frames,
+    train,
+    view,
+)
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.policies import policies_app
 
@@ -23,6 +34,9 @@ model_app = typer.Typer(
 
 def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
     """Add the lab's commands to `chauffeur`, under the headings of its help."""
+    app.command(epilog=view.EXAMPLES, rich_help_panel=look, short_help="Runs and trips on one page, live or a file.")(
+        view.view
+    )
     app.command(epilog=report.EXAMPLES, rich_help_panel=look)(report.report)
     app.command(
         epilog=evaluate.EXAMPLES, rich_help_panel=measure, short_help="One planner on all benchmarks: a score card."
