@@ -56,7 +56,7 @@ def evaluate(
     folder = out or Path("runs") / f"evaluate-{name}-{profile}"
     evaluation = Evaluation(who, folder, cast("Profile", profile), _options(option or []), benchmarks or ())
     runs = sum(one.benchmark is not None for one in evaluation.parts)
-    console.print(f"{who.made.id}, profile {profile}: {runs} benchmarks, folder {folder}", soft_wrap=True)
+    console.print(f"{who.made.id}, profile {profile}, benchmarks to run: {runs}; folder {folder}", soft_wrap=True)
     try:
         card = evaluation.run(lambda part, run: _shown(console, part, run), work)
     except KeyboardInterrupt:
@@ -66,7 +66,8 @@ def evaluate(
     console.print(f"Card: {folder / 'card.json'}, {folder / 'card.md'}", soft_wrap=True)
     if any(one.state == "partial" for one in card.entries):
         raise typer.Exit(UNFINISHED)
-    if any(one.state == "failed" for one in card.entries):
+    named = [one for one in card.entries if one.name in (benchmarks or ())]
+    if any(one.state == "failed" for one in card.entries) or any(one.state == "not run" for one in named):
         raise typer.Exit(FAILED)
 
 
