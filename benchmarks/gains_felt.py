@@ -18,7 +18,7 @@ from chauffeur.bench.motion.items import style_ranges, track_scenario
 from chauffeur.bench.motion.scoring import MotionStatistics, command_alignment, driving_score, measured
 from chauffeur.concept import ActionMatrix, Frame, Limits
 from chauffeur.concept.weather import WEATHERS
-from chauffeur.driving.session import drive_policy
+from chauffeur.driving.episode import drive_policy
 from chauffeur.models.vlm.gains import GainCase, taught_gains
 from chauffeur.planners.prompts.motion import MODERATE
 from chauffeur.planners.vlm.template import STYLES

@@ -27,7 +27,7 @@ from chauffeur.bench.personalization.scenes import AIMS, GROUND_OF, Task, scenes
 from chauffeur.bench.personalization.takeover import Mood, judge
 from chauffeur.concept import Limits
 from chauffeur.describe import describe
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 
 TASKS: Final[tuple[Task, ...]] = ("overtake", "follow", "right_lane", "yield", "go", "park")
 SHARES: Final = tuple(round(float(share), 2) for share in np.arange(0.6, 1.101, 0.05))

@@ -22,8 +22,8 @@ from chauffeur.camera import make_renderer
 from chauffeur.concept import LAMPILOT_LIMITS, Context, Instruction, PlanRequest, Scenario, SystemMessage
 from chauffeur.describe.traffic import describe_with_traffic
 from chauffeur.describe.vision import CameraDescriptor, SceneAnswers
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.judge.metrics import ORIGIN, points
-from chauffeur.driving.session import make_world
 from chauffeur.models.bev_llm.seeing import BevLlmReader
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner

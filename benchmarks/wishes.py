@@ -25,8 +25,8 @@ from chauffeur.bench.passengers import PassengerRequests
 from chauffeur.bench.passengers.loader import PassengerWish, load_wishes, parse_wishes
 from chauffeur.concept import LAMPILOT_LIMITS, Context, Plan
 from chauffeur.describe import describe
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.judge.goals import answered_rightly
-from chauffeur.driving.session import make_world
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Item

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import make_world
 
 
 def lanes(

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
-from chauffeur.concept.extras import LAB, LAB_EXTRAS
+import chauffeur
+from chauffeur.cli.main import app
+from chauffeur.concept import MissingExtraError
+from chauffeur.concept.extras import LAB, LAB_EXTRAS, install_command
 from chauffeur.version import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECTS = {name: tomllib.loads((folder / "pyproject.toml").read_text()) for name, folder in
             (("chauffeur", ROOT), (LAB, ROOT / "lab"))}  # fmt: skip
 WEIGHT_MB = 100
-"""Largest file that package indexes take without being asked."""
+"""Most that package indexes take without being asked."""
 
 
 def held(folder: Path, target: str) -> dict[str, Path]:
@@ -87,3 +94,39 @@ def test_the_contract_of_imports_names_every_room_that_drives() -> None:
     rooms = {path.name for path in (ROOT / "src" / "chauffeur").iterdir() if (path / "__init__.py").is_file()}
     named = {name.split(".")[1] for name in contract["source_modules"]}
     assert rooms - {"bench", "models"} <= named
+
+
+@pytest.mark.parametrize(
+    "command", ["bench lampilot", "bench --help", "report runs", "model train", "check benchmark x"]
+)
+def test_without_the_lab_its_commands_say_how_to_get_it(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "chauffeur.bench", None)
+    result = CliRunner().invoke(app, command.split())
+    assert result.exit_code == 2
+    said = "".join(result.output.split())
+    assert LAB in said and "".join(install_command().split()) in said
+
+
+def test_without_the_lab_no_benchmark_is_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "chauffeur.bench", None)
+    with pytest.raises(MissingExtraError, match=LAB):
+        chauffeur.run_benchmark("passengers", out=tmp_path)
+
+
+def test_what_is_missing_is_installed_from_where_this_came_from(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def came_from(url: str, **about: Any) -> None:
+        known = SimpleNamespace(read_text=lambda name: json.dumps({"url": url, **about}))
+        monkeypatch.setattr("chauffeur.concept.extras.distribution", lambda name: known)
+
+    pip = f"{sys.executable} -m pip install"
+    came_from("https://example.org/chauffeur.whl")
+    assert install_command("town") == f'{pip} "chauffeur[town]"'
+    assert (install_command(), install_command("models")) == (f'{pip} "{LAB}"', f'{pip} "{LAB}[models]"')
+    came_from((tmp_path / "gone").as_uri(), dir_info={"editable": True})
+    assert install_command("town") == f'{pip} "chauffeur[town]"', "sources that an image was built from are not in it"
+    came_from(ROOT.as_uri(), dir_info={"editable": True})
+    pins = f'-c "{ROOT / "constraints.txt"}" -e'
+    assert install_command("town") == f'{pip} {pins} "{ROOT}[town]"'
+    assert install_command() == f'{pip} {pins} "{ROOT / "lab"}"'

@@ -26,18 +26,21 @@ from chauffeur.concept import (
     Limits,
     Observation,
     Plan,
-    PlanRequest,
     Policy,
     Scenario,
     ScenarioError,
     SystemMessage,
     Thoughts,
+    Trip,
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
-from chauffeur.driving.loop import Stages, drive
+from chauffeur.driving.episode import drive_policy, make_world
+from chauffeur.driving.loop import drive, steps_at
+from chauffeur.driving.planning import Planned, declined
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import Forgetful, check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.driving.session import Forgetful, check_drive
+from chauffeur.driving.trips import make_trip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
@@ -158,18 +161,25 @@ def test_a_planner_that_looks_is_given_pictures_and_drives_by_them(
         seen.append(CameraImage("front", observation.time_s, picture))
         return tuple(seen)
 
-    def execute(request: PlanRequest, plan: Plan, verdicts: Any, scenario: Scenario, seed: int) -> Any:
-        assert request.images == tuple(seen)
-        assert not declined(plan, verdicts)
-        assert plan.policy is not None
-        episode = drive_policy(world, plan.policy, None, 12.0, request.limits)
-        return make_trip(request, plan, verdicts, scenario, seed, episode, "")
+    def execute(planned: Planned) -> Trip:
+        assert planned.request.images == tuple(seen)
+        assert not planned.refusal
+        assert planned.plan.policy is not None
+        episode = drive_policy(world, planned.plan.policy, None, 12.0, planned.request.limits)
+        return make_trip(planned, PLACE, 3, episode)
 
     assert isinstance(planner, Planner)
-    stages = Stages(
-        world, describe, Forgetful(), lambda _: SystemMessage(""), planner, check_drive, execute, lambda *_: None, see
+    steps = steps_at(
+        world.reset(PLACE, 3),
+        planner,
+        Forgetful(),
+        Limits(),
+        describe=describe,
+        system=lambda _: SystemMessage(""),
+        check=check_drive,
+        see=see,
     )
-    trip = asyncio.run(drive(Instruction("Drive as the light allows."), PLACE, 3, Limits(), stages))
+    trip = asyncio.run(drive(Instruction("Drive as the light allows."), steps, execute, Forgetful()))
     assert dict(trip.plan.settings)["target_speed_mps"] == pytest.approx(speed, abs=0.01)
     assert trip.outcome == "ended"
 

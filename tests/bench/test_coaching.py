@@ -22,9 +22,11 @@ from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
 from chauffeur.driving.again import drive_again
+from chauffeur.driving.episode import drive_policy, make_world, trip_s
 from chauffeur.driving.judge.choice import referee_for
+from chauffeur.driving.planning import Planned, declined
 from chauffeur.driving.recording import RecordedTrip, compare_trips, read_trip, write_trip
-from chauffeur.driving.session import declined, drive_policy, make_trip, make_world, trip_s
+from chauffeur.driving.trips import make_trip
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.memory.policies_entry import content_id
@@ -140,7 +142,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     assert episode.success and episode.outcome == "success"
     assert episode.said[0][1] == "Here we go." and "is_safe_enter" in {c.name for f in episode.frames for c in f.calls}
     # It is recorded and shown with its helper, and the recording drives the same again.
-    trip = make_trip(request, plan, verdicts, item.scenario, item.scenario.seed, episode, "", shielded=True)
+    trip = make_trip(Planned(plan, verdicts, request), item.scenario, item.scenario.seed, episode, shielded=True)
     recorded = RecordedTrip(trip, episode.frames, item.scenario, request.system, episode.final)
     write_trip(tmp_path / "trip.mcap", trip, episode.frames, item.scenario, system=request.system, final=episode.final)
     read = read_trip(tmp_path / "trip.mcap")
@@ -149,7 +151,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     assert again is not None and compare_trips(recorded, again) is None
     assert "def go_left():" in policy_words(plan.policy)
     alone = replace(plan, policy=Program(USE_IT))
-    assert make_trip(request, alone, (), item.scenario, item.scenario.seed, episode, "").id != trip.id
+    assert make_trip(Planned(alone, (), request), item.scenario, item.scenario.seed, episode).id != trip.id
     # Without the library it is refused before it drives, and would die if it did.
     bare = replace(plan, policy=Program(USE_IT))
     assert "go_left" in declined(bare, run_checks(bare, observation, LAMPILOT_LIMITS))

@@ -34,8 +34,7 @@ from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
-from chauffeur.driving.episode import Episode
-from chauffeur.driving.session import drive_without_program, make_world
+from chauffeur.driving.episode import Episode, drive_without_program, make_world
 from chauffeur.language.letters import clean
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.programs.gate import check_source

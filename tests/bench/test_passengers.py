@@ -25,8 +25,8 @@ from chauffeur.bench.passengers.loader import STEMS, parse_wishes
 from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Observation
 from chauffeur.describe import describe
+from chauffeur.driving.episode import drive_without_program
 from chauffeur.driving.judge.goals import make_goal
-from chauffeur.driving.session import drive_without_program
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
 

@@ -10,7 +10,7 @@ import pytest
 from chauffeur.bench.personalization.ride import ride_policy
 from chauffeur.bench.personalization.scenes import DRIVE_S, GROUND_OF, TASKS, Task, scenes_of
 from chauffeur.concept import Limits, Observation, Parameters
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 
 
 def _first(task: Task) -> list[Observation]:

@@ -9,9 +9,9 @@ import pytest
 from chauffeur.bench.lampilot.expert import expert_program, variants
 from chauffeur.bench.lampilot.rehearse import OriginJudge, candidates, rehearsed
 from chauffeur.concept import Metric, Outcome, Scenario
+from chauffeur.driving.episode import drive_program
 from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.driving.judge.metrics import points
-from chauffeur.driving.session import drive_program
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 

@@ -96,7 +96,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
         panels.setdefault(command.rich_help_panel, []).append(name)
     assert {heading: sorted(names) for heading, names in panels.items()} == {
         "Drive": ["drive", "feedback", "me", "talk"],
-        "Look": ["doctor", "replay", "report", "show"],
+        "Look": ["doctor", "plugins", "replay", "report", "show", "what-if"],
         "Measure": ["bench"],
         "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
@@ -263,8 +263,8 @@ def test_a_changed_recording_is_noticed(driven: Path) -> None:
     write_trip(path, trip, frames, recorded.scenario, final=recorded.final)
     result = invoke("replay", str(path))
     assert result.exit_code == 1
-    assert "tick 4, observation.ego.x_m" in result.output
-    assert "recorded with chauffeur 0.0.1" in result.output
+    assert "in control period 4" in result.output and "observation.ego.x_m" in result.output
+    assert "Recorded with Chauffeur 0.0.1" in result.output
 
 
 def test_a_page_is_rendered_again(driven: Path) -> None:

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import make_world
 
 run = CliRunner()
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 
 from chauffeur.cli.lines import MOST_CHARACTERS, Lines
 from chauffeur.cli.main import app
-from chauffeur.driving.live.recorder import unanswered
+from chauffeur.driving.recorder import unanswered
 from chauffeur.safety.audit import read_records, verify
 
 WISH = "Hold the lane for a moment."

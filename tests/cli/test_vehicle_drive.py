@@ -78,7 +78,7 @@ def test_autoware_in_a_dry_run(tmp_path: Path) -> None:
 def test_refusals_end_with_1(file: Path) -> None:
     result = invoke(file, "Drive at 90 km/h.", "--dry-run")
     assert result.exit_code == 1
-    assert "“Drive at 90 km/h.” refused" in one_line(result)
+    assert "“Drive at 90 km/h.” declined" in one_line(result)
     assert "rostopic" not in result.output
 
 
@@ -116,7 +116,7 @@ def test_questions_and_leave_taking_ask_nothing_of_the_vehicle(file: Path, leave
     for code, said in ((typed.returncode, typed.stdout), (given.exit_code, given.output)):
         assert len(re.findall(r"velocity_max: ([\d.]+)", said)) == 1, said
         assert "You end the session." in said
-        assert "“are we there yet?” answered" in " ".join(said.split())
+        assert "“are we there yet?” done" in " ".join(said.split())
         assert "“Drive at 30 km/h.”" not in said
         assert code == 1, "“Why so slow?” was asked back, and not done"
 
@@ -125,7 +125,7 @@ def test_without_a_vehicle_it_is_said(file: Path) -> None:
     pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
     result = invoke(file, "Drive at 20 km/h.", "--wait", 0.5)
     assert result.exit_code == 1
-    assert "“Drive at 20 km/h.” unreachable" in one_line(result)
+    assert "“Drive at 20 km/h.” not done" in one_line(result)
     assert "Nothing was published." in one_line(result)
     assert "Nothing was asked of the vehicle." in one_line(result)
 

@@ -164,14 +164,14 @@ def test_spoken_wishes_reach_the_vehicle(
         assert "stays on this machine" in terminal.until("Speech: grammar/")
         room.say(speech("command stop"))
         assert "“stop”" in terminal.until("after you spoke: ")
-        terminal.until("“stop” dry-run Planned speeds are capped at 0 km/h")
+        terminal.until("“stop” done Planned speeds are capped at 0 km/h")
         terminal.until("s after you spoke)")
 
         room.say(speech("command drive at twenty kilometers per hour"))
         terminal.until("Is that what you mean?")
         assert not any("capped at 20.02 km/h" in line for line in terminal.lines), "nothing is asked before the yes"
         terminal.type("yes")
-        terminal.until("dry-run Planned speeds are capped at 20.02 km/h")
+        terminal.until("done Planned speeds are capped at 20.02 km/h")
 
         room.say(speech("command drive at thirty kilometers per hour"))
         terminal.until("Is that what you mean?")
@@ -195,7 +195,7 @@ def test_spoken_wishes_reach_the_vehicle(
 
 def test_wishes_of_the_command_line_come_first_and_ctrl_c_ends_listening(room: Room, file: Path) -> None:
     with talking(room, file, "Drive at 20 km/h.", "--microphone", "--dry-run") as terminal:
-        terminal.until("dry-run Planned speeds are capped at 20.02 km/h")
+        terminal.until("done Planned speeds are capped at 20.02 km/h")
         assert terminal.process.stdin is not None
         terminal.process.stdin.close()  # nothing more to type: whoever speaks is still listened to
         time.sleep(1.0)

@@ -12,7 +12,7 @@ from chauffeur.driving.emergency import EMERGENCY_PLANNER, QUESTION, STOPPING
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Runtime
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session, parse_wish

@@ -15,7 +15,8 @@ from chauffeur.concept import NOBODY, Limits, Parameters, Plan, PlanRequest, Pro
 from chauffeur.driving.emergency import ASKED, GOING_ON, QUESTION, STOPPING
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleSession
+from chauffeur.driving.onroad.answers import OnRoadAnswer
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session, parse_wish
@@ -204,7 +205,7 @@ def test_a_vehicle_is_asked_for_a_stop_and_for_none_that_was_refused() -> None:
     async def steps() -> list[OnRoadAnswer]:
         async with VehicleSession(vehicle, file, Never()) as road:
             texts = (*STOPS, *REFUSALS, *DISTRESS)
-            return [await road.ask(text) for text in texts] + [await road.evaluate(STOPS[1])]
+            return [await road.ask(text) for text in texts] + [await road.feedback(STOPS[1])]
 
     answers = asyncio.run(steps())
     vehicle.close()

@@ -22,12 +22,13 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.driving.again import drive_again
+from chauffeur.driving.episode import drive_without_program
 from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.judge.setpoints import GAP_M, SPEED_MPS
 from chauffeur.driving.judge.trace import HELD_S
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
-from chauffeur.driving.session import Session, drive_without_program
+from chauffeur.driving.session import Session
 from chauffeur.hmi.words import account_words, end_words, trip_words
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.feedback import interpret_feedback

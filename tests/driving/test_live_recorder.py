@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from chauffeur.concept import Command, DataError, Feedback, Instruction, Intervention, PersonId, Setpoints
+from chauffeur.concept import Command, DataError, Feedback, Instruction, Intervention, PersonId, Result, Setpoints
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.live.messages import FallbackLevel, Report
-from chauffeur.driving.live.recorder import LiveRecorder, Unanswered, unanswered
+from chauffeur.driving.live.messages import FallbackLevel, LiveEnd, Report
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Runtime
-from chauffeur.driving.live.trip_memory import trip_of
+from chauffeur.driving.recorder import DriveRecorder, Unanswered, open_audit, unanswered
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session_recorder import DriveRecorder, open_audit
+from chauffeur.driving.trips import live_trip
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.safety.audit import AuditLog, AuditRecord, read_records, redact, verify, words_of
 
@@ -53,6 +53,14 @@ def report(
     return Report(interventions=interventions, **(fields | changes))  # type: ignore[arg-type]
 
 
+def wished(wish: str) -> DriveEvent:
+    return DriveEvent("wish", wish, WISH, value=Instruction(WISH, ZEBEDEE))
+
+
+def ended(outcome: str, lost: int = 0, figures: Mapping[str, Any] | None = None) -> DriveEvent:
+    return DriveEvent("over", value=LiveEnd(outcome, figures or {}, lost))
+
+
 def records(path: Path, kind: str = "") -> list[AuditRecord]:
     return [record for _, record in read_records(path) if kind in ("", record.kind)]
 
@@ -63,8 +71,8 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def books(path: Path) -> Iterator[LiveRecorder]:
-    with LiveRecorder(open_audit(path, SCENARIO, 3), DT_S) as kept:
+def books(path: Path) -> Iterator[DriveRecorder]:
+    with open_audit(path, SCENARIO, 3) as kept:
         yield kept
 
 
@@ -86,21 +94,19 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = Settings(starts=(start,), planner=f"replay/{answers}", speed=8.0, realtime=False)
     log = folder / "audit.jsonl"
     memory = VaultMemory(folder / MEMORY)
-    with LiveRecorder(open_audit(log, SCENARIO, 3), DT_S) as books:
-        opened = Runtime(settings, books.tell)
-        books.follow(opened, settings)
-        with opened as runtime:
+    with open_audit(log, SCENARIO, 3) as books:
+        with Runtime(settings, books.tell) as runtime:
             _three_wishes(runtime, books, log)
         for interaction in runtime.interactions.values():
-            trip = trip_of(interaction, start, DT_S, runtime.report)
+            trip = live_trip(interaction, start, DT_S, runtime.report)
             assert trip is not None
             memory.remember(trip, None)
     return log
 
 
-def _three_wishes(runtime: Runtime, books: LiveRecorder, log: Path) -> None:
+def _three_wishes(runtime: Runtime, books: DriveRecorder, log: Path) -> None:
     for words in (WISH, UNWANTED, TOO_FAST):
-        books.wish(runtime.next_wish, Instruction(words, ZEBEDEE))
+        books.tell(DriveEvent("wish", runtime.next_wish, words, value=Instruction(words, ZEBEDEE)))
         assert books.kept().result()
         asked = runtime.ask(words, ZEBEDEE)
         assert [each.wish for each in unanswered(log)] == [asked], "on the disk before it is asked, and yet open"
@@ -115,7 +121,7 @@ def _three_wishes(runtime: Runtime, books: LiveRecorder, log: Path) -> None:
         time.sleep(0.01)
     runtime.poll()
     assert runtime.report is not None
-    books.end(runtime.report.outcome, runtime.figures(), runtime.lost_reports)
+    books.tell(ended(runtime.report.outcome, runtime.lost_reports, runtime.figures() or {}))
 
 
 def test_a_drive_is_told_from_the_first_wish_to_the_last_command(driven: Path) -> None:
@@ -130,6 +136,8 @@ def test_a_drive_is_told_from_the_first_wish_to_the_last_command(driven: Path) -
     ]  # fmt: skip
     outcomes = {record.body.get("wish", ""): record.body["outcome"] for record in records(driven, "outcome")}
     assert outcomes == {"w1": "finished", "w2": "declined", "w3": "refused", "": "stopped"}
+    results = [record.body["result"] for record in records(driven, "outcome") if record.body.get("wish")]
+    assert results == ["done", "declined", "declined"]
     assert [record.body["passed"] for record in records(driven, "verdict")] == [True, False]
     assert unanswered(driven) == ()
 
@@ -190,8 +198,8 @@ def test_every_command_is_there(driven: Path) -> None:
 # Wishes ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_wish_is_on_the_disk_before_anything_comes_of_it(books: LiveRecorder, path: Path) -> None:
-    books.wish("w1", Instruction(WISH, ZEBEDEE))
+def test_a_wish_is_on_the_disk_before_anything_comes_of_it(books: DriveRecorder, path: Path) -> None:
+    books.tell(wished("w1"))
     assert books.kept().result()
     assert unanswered(path) == (Unanswered("w1", WISH, "zebedee"),), "while the log is still open"
 
@@ -218,17 +226,18 @@ def test_a_log_of_an_ordinary_drive_holds_open_wishes_too(path: Path) -> None:
     assert unanswered(path) == (), "why it was not driven is an answer"
 
 
-def test_a_wish_that_is_not_asked_is_answered_here(books: LiveRecorder, path: Path) -> None:
-    books.wish("", Instruction("x" * 2000, ZEBEDEE))
-    books.answer("", "refused", "Far too long.")
+def test_a_wish_that_is_not_asked_is_answered_here(books: DriveRecorder, path: Path) -> None:
+    books.tell(DriveEvent("wish", value=Instruction("x" * 2000, ZEBEDEE)))
+    books.tell(DriveEvent("refused", text="Far too long.", final=True, result=Result.DECLINED))
     books.close()
     assert unanswered(path) == ()
-    assert words_of(records(path, "outcome")[0])["detail"] == "Far too long."
+    (outcome,) = records(path, "outcome")
+    assert (words_of(outcome)["detail"], outcome.body["result"]) == ("Far too long.", "declined")
 
 
 def test_private_books_hold_no_words(path: Path) -> None:
-    with LiveRecorder(open_audit(path, SCENARIO, 3, private=True), DT_S) as books:
-        books.wish("w1", Instruction(WISH, ZEBEDEE))
+    with open_audit(path, SCENARIO, 3, private=True) as books:
+        books.tell(wished("w1"))
         books.tell(DriveEvent("planning", "w1", "Zebedee!"))
     assert b"ebedee" not in path.read_bytes()
     assert [each.text for each in unanswered(path)] == ["[withheld]"]
@@ -249,9 +258,9 @@ def full_disk() -> AuditLog:
 
 
 def test_a_full_disk_stops_nothing() -> None:
-    books = LiveRecorder(DriveRecorder(full_disk()), DT_S)
+    books = DriveRecorder(full_disk(), DT_S)
     began_s = time.monotonic()
-    books.wish("w1", Instruction(WISH))
+    books.tell(wished("w1"))
     kept = books.kept()
     for tick in range(100):
         books.tell(DriveEvent("period", value=report(tick)))
@@ -260,7 +269,7 @@ def test_a_full_disk_stops_nothing() -> None:
     assert not books.close().complete
 
 
-def test_what_cannot_be_written_leaves_a_gap(books: LiveRecorder, path: Path) -> None:
+def test_what_cannot_be_written_leaves_a_gap(books: DriveRecorder, path: Path) -> None:
     books.tell(DriveEvent("period", value=report(0, requested=None)))
     books.tell(DriveEvent("period", value=report(1, applied="hard")))
     books.tell(DriveEvent("period", value=report(2)))
@@ -270,7 +279,7 @@ def test_what_cannot_be_written_leaves_a_gap(books: LiveRecorder, path: Path) ->
     assert {name for record in records(path, "gap") for name in record.body["lost"]} >= {"actuation"}
 
 
-def test_control_periods_that_were_not_heard_are_a_gap(books: LiveRecorder, path: Path) -> None:
+def test_control_periods_that_were_not_heard_are_a_gap(books: DriveRecorder, path: Path) -> None:
     for tick in (0, 1, 7, 8):
         books.tell(DriveEvent("period", value=report(tick)))
     books.close()
@@ -278,14 +287,14 @@ def test_control_periods_that_were_not_heard_are_a_gap(books: LiveRecorder, path
     assert [record.body["ticks"] for record in records(path, "actuation")] == [[0, 1], [7, 8]]
 
 
-def test_interventions_replacements_and_rungs_are_told(books: LiveRecorder, path: Path) -> None:
+def test_interventions_replacements_and_rungs_are_told(books: DriveRecorder, path: Path) -> None:
     change = Intervention("gap", "2 m too close", Command(1.0, 0.0), Command(-3.0, 0.0))
     levels: tuple[FallbackLevel, ...] = ("follow", "hold", "follow", "hold", "keep", "keep", "slow", "stop", "follow")
     for tick, level in enumerate(levels):
         books.tell(DriveEvent("period", value=report(tick, level, (change,) if tick == 3 else ())))
     books.tell(DriveEvent("replaced", text="It hung.", value="policy"))
-    books.end("ended", None, 2)
-    books.end("ended", None, 2)
+    books.tell(ended("ended", 2))
+    books.tell(ended("ended", 2))
     books.close()
     assert [record.body["rule"] for record in records(path, "intervention")] == ["gap"]
     notes = [record.body for record in records(path, "context")]
@@ -296,10 +305,10 @@ def test_interventions_replacements_and_rungs_are_told(books: LiveRecorder, path
     assert outcome.body["periods_by_rung"] == {"follow": 3, "hold": 2, "keep": 2, "slow": 1, "stop": 1}
 
 
-def test_taking_over_is_told_and_counted(books: LiveRecorder, path: Path) -> None:
+def test_taking_over_is_told_and_counted(books: DriveRecorder, path: Path) -> None:
     for tick, taken in enumerate((False, True, True, False, True)):
         books.tell(DriveEvent("period", value=report(tick, "hand" if taken else "follow", taken_over=taken)))
-    books.end("ended", None, 0)
+    books.tell(ended("ended"))
     books.close()
     notes = [record.body for record in records(path, "context") if record.body.get("event") == "taken_over"]
     assert [(note["on"], note["tick"]) for note in notes] == [(True, 1), (False, 3), (True, 4)]
@@ -309,7 +318,7 @@ def test_taking_over_is_told_and_counted(books: LiveRecorder, path: Path) -> Non
 
 
 def test_a_drive_that_breaks_off_says_so(path: Path) -> None:
-    with pytest.raises(RuntimeError), LiveRecorder(open_audit(path, SCENARIO, 3), DT_S) as books:
+    with pytest.raises(RuntimeError), open_audit(path, SCENARIO, 3) as books:
         books.tell(DriveEvent("period", value=report(0)))
         raise RuntimeError("the planner could not be started")
     assert [record.body["outcome"] for record in records(path, "outcome")] == ["broken_off"]

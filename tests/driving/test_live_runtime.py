@@ -22,8 +22,8 @@ from chauffeur.driving.live.plan_messages import TOOK_OVER
 from chauffeur.driving.live.settings import Settings, ring
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Runtime
-from chauffeur.driving.live.trip_memory import trip_of
 from chauffeur.driving.scenarios import find
+from chauffeur.driving.trips import live_trip
 
 STARTS = (Start(find("overtake"), 3, most_s=3_600.0),)
 SETTINGS = Settings(STARTS, planner="meaning", speed=2.0, realtime=False)
@@ -202,7 +202,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back_until_control_is_killed(para
         assert runtime.figures() is None
     assert {report.level for report in heard.reports if report.taken_over} == {"hand"}
     assert heard.reports[-1].faults == 0
-    trip = trip_of(interaction, STARTS[0], 0.1, heard.reports[-1])
+    trip = live_trip(interaction, STARTS[0], 0.1, heard.reports[-1])
     assert trip is not None
     assert dict(trip.record)["taken_over"] is True
 

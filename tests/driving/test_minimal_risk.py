@@ -4,8 +4,8 @@ import pytest
 
 from chauffeur.concept import Limits, Setpoints
 from chauffeur.driving.emergency import planned_for
+from chauffeur.driving.episode import drive_policy, make_world
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import drive_policy, make_world
 
 
 @pytest.mark.parametrize(

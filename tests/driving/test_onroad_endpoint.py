@@ -15,7 +15,8 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "planners"))
 from server import ModelServer, silent, stream
 
 from chauffeur.describe.services import Sources, read_sources
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleSession
+from chauffeur.driving.onroad.answers import OnRoadAnswer
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import chauffeur
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 
 SOURCE = Path(chauffeur.__file__).parent
 ONROAD = SOURCE / "driving" / "onroad"
@@ -77,7 +77,7 @@ def test_a_session_that_ran_never_loaded_it(tmp_path: Path) -> None:
     program = """
 import asyncio, sys
 from pathlib import Path
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import read_settings

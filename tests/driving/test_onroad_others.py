@@ -18,7 +18,7 @@ from rosbridge_server import eventually
 
 from chauffeur.concept import Parameters
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings

@@ -18,7 +18,8 @@ from test_services_server import Asked, reply, roads_json, serving
 from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.describe.services import Sources, Unknown, read_sources
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleSession
+from chauffeur.driving.onroad.answers import OnRoadAnswer
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.factory import open_vehicle

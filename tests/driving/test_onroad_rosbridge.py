@@ -19,7 +19,9 @@ from rosbridge_server import FOLLOWER, HOST, REPLANNER, Bridge, eventually, free
 
 from chauffeur.concept import Parameters
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleSession, open_recorder
+from chauffeur.driving.onroad.answers import OnRoadAnswer
+from chauffeur.driving.onroad.session import VehicleSession
+from chauffeur.driving.recorder import open_vehicle_audit
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -167,7 +169,7 @@ def test_a_server_that_dies_and_comes_back(tmp_path: Path, embedded: Planner) ->
         await until(lambda: len(servers[1].published) == 4)
 
     try:
-        with open_recorder(log, file, "rosbridge", dry_run=False) as books:
+        with open_vehicle_audit(log, file, "rosbridge", dry_run=False) as books:
             drive(f"ws://{HOST}:{port}", embedded, steps, books=books)
     finally:
         servers[-1].close()

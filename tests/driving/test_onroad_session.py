@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,13 +28,16 @@ from chauffeur.concept import (
     PlanRequest,
     ProfileError,
     Program,
+    Result,
     Thoughts,
 )
 from chauffeur.driving import questions
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import OnRoadAnswer, VehicleRecorder, VehicleSession, open_recorder
 from chauffeur.driving.onroad import session as onroad
+from chauffeur.driving.onroad.answers import OnRoadAnswer
 from chauffeur.driving.onroad.checks import fitted, is_about_engaging, is_stop
+from chauffeur.driving.onroad.session import VehicleSession
+from chauffeur.driving.recorder import DriveRecorder, open_vehicle_audit
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
@@ -173,7 +177,7 @@ def test_what_is_not_asked_of_the_vehicle(embedded: Planner, wish: str, status: 
     (answer,) = ask(embedded, wish)
     assert (answer.status, answer.published) == (status, None), answer.words
     assert said in answer.words
-    assert not answer.done
+    assert answer.result is Result.DECLINED
 
 
 def test_the_tightest_bound_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,7 +323,7 @@ def test_feedback_takes_no_wish_s_place() -> None:
         wish = asyncio.create_task(road.ask("Drive."))
         while not planner.requests:
             await asyncio.sleep(0.001)
-        assert (await road.evaluate("too slow")).status == "declined"
+        assert (await road.feedback("too slow")).status == "declined"
         go.set()
         assert (await wish).status == "dry-run"
 
@@ -343,7 +347,7 @@ def test_listeners_and_memories_that_fail_take_nothing_down(caplog: pytest.LogCa
         road = VehicleSession(car, settings, gives(5.0), person=ANA, memory=Broken(), tell=deaf)  # type: ignore[arg-type]
         async with road:
             assert (await road.ask("Drive.")).status == "dry-run"
-            assert (await road.evaluate("fine")).status == "declined"
+            assert (await road.feedback("fine")).status == "declined"
         after = await road.ask("Drive.")
         assert (after.status, after.words) == ("failed", "The session is over.")
 
@@ -403,7 +407,7 @@ def test_it_is_remembered_and_recalled(tmp_path: Path, embedded: Planner, asked_
     async def steps(road: VehicleSession) -> None:
         answers.append(await road.ask("Drive at 30 km/h."))
         opinion = "That was too fast."
-        answers.append(await road.evaluate(opinion) if asked_for else await road.ask(opinion))
+        answers.append(await road.feedback(opinion) if asked_for else await road.ask(opinion))
 
     drive(embedded, steps, person=ANA, memory=memory)
     assert answers[0].status == "dry-run" and (answers[1].status == "taken" or not asked_for)
@@ -453,8 +457,8 @@ def test_feedback_without_a_drive(tmp_path: Path, embedded: Planner) -> None:
     said: list[OnRoadAnswer] = []
 
     async def steps(road: VehicleSession) -> None:
-        said.append(await road.evaluate("too fast"))
-        said.append(await road.evaluate("  "))
+        said.append(await road.feedback("too fast"))
+        said.append(await road.feedback("  "))
 
     drive(embedded, steps)
     drive(embedded, steps, person=ANA, memory=VaultMemory(tmp_path / "home"))
@@ -478,10 +482,10 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
             return apply(parameters)
 
     async def whole() -> None:
-        with open_recorder(path, file, "rosbridge", dry_run=True) as books:
+        with open_vehicle_audit(path, file, "rosbridge", dry_run=True) as books:
             async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
-                await road.evaluate("nice")
+                await road.feedback("nice")
                 await road.ask("Change to the left lane.")
 
     asyncio.run(whole())
@@ -503,18 +507,20 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
     assert letters == ["C", "H", "S", "F", "C", "H", "S"]
 
 
-class Full(VehicleRecorder):
+class Full(DriveRecorder):
     """Books on a disk that takes nothing."""
 
-    def kept(self, within_s: float = 0.0) -> bool:
-        return False
+    def kept(self, within_s: float = 0.0) -> Future[bool]:
+        never: Future[bool] = Future()
+        never.set_result(False)
+        return never
 
 
 def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path) -> None:
     file = tmp_path / "vehicle.toml"
     file.write_text(FILE)
-    log = open_recorder(tmp_path / "audit.jsonl", file, "rosbridge", dry_run=True)
-    with Full(log._log) as books:
+    log = open_vehicle_audit(tmp_path / "audit.jsonl", file, "rosbridge", dry_run=True)
+    with Full(log.log) as books:
         answers = ask(gives(5.0), "x", "stop", books=books)
     assert [one.status for one in answers] == ["failed", "dry-run"]
     assert "Nothing was published" in answers[0].words
@@ -532,7 +538,7 @@ def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
     kinds = ("link", "wish", "context", "plan", "verdicts", "asking", "asked", "answer")
     told = [word for word in done.stdout.split() if word in kinds]
     assert told == ["wish", *(kind for kind in kinds if kind != "wish")]
-    assert "dry-run Planned speeds are capped" in done.stdout
+    assert "done Planned speeds are capped" in done.stdout
 
 
 def test_it_ends_with_what_stays(embedded: Planner) -> None:

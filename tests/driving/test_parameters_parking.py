@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Parameters, Scenario, ScenarioError
-from chauffeur.driving.episode import Episode
-from chauffeur.driving.session import drive_executed
+from chauffeur.driving.episode import Episode, drive_executed
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.parking import PLACES, ParkingReferee, ParkingWorld
 

@@ -11,8 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Parameters, Scenario, ScenarioError
-from chauffeur.driving.episode import Episode
-from chauffeur.driving.session import drive_executed
+from chauffeur.driving.episode import Episode, drive_executed
 from chauffeur.executors.pursuit import ParametersDriver
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.highway import HighwayWorld

@@ -6,10 +6,9 @@ import pytest
 
 from chauffeur.bench.hostile.rollout import ran_sign
 from chauffeur.concept import Limits, Parameters, Program
-from chauffeur.driving.episode import Episode
+from chauffeur.driving.episode import Episode, drive_policy, drive_program, make_world
 from chauffeur.driving.judge.metrics import ANY_STOP_M
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import drive_policy, drive_program, make_world
 
 TAILGATES = """\
 def drive():

@@ -16,9 +16,10 @@ pytest.importorskip("vehiclemodels")
 from chauffeur.bench.motion.items import MotionItem, commands
 from chauffeur.cli.drive import save_trip
 from chauffeur.concept import Limits, PersonId, Plan, PlanRequest
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.seat import SeatCamera
-from chauffeur.driving.session import Session, make_world, parse_wish
+from chauffeur.driving.session import Session, parse_wish
 from chauffeur.memory.records import body_of, item_of
 from chauffeur.planners.motion import FixedGainsPlanner
 

@@ -29,10 +29,11 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.trace import Intervention
 from chauffeur.driving.events import DriveEvent, told_to
+from chauffeur.driving.recorder import DriveRecorder, open_audit, with_head
 from chauffeur.driving.recording import RecordedTrip, compare_trips
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import Session, parse_wish, scenario_hash
-from chauffeur.driving.session_recorder import DriveRecorder, open_audit, with_head
+from chauffeur.driving.session import Session, parse_wish
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import AuditLog, AuditRecord, head_path, read_records, redact, verify, words_of

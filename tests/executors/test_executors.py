@@ -21,8 +21,8 @@ from chauffeur.concept import (
     Trajectory,
 )
 from chauffeur.driving.conformance import check_executor
+from chauffeur.driving.episode import drive_policy
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import drive_policy
 from chauffeur.executors import executor_for
 from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.trajectory import rebased, reference_of

@@ -6,8 +6,9 @@ import asyncio
 import hashlib
 
 from chauffeur.concept import NOBODY, Limits
+from chauffeur.driving.episode import drive_program, make_world
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import Session, drive_program, make_world, parse_wish
+from chauffeur.driving.session import Session, parse_wish
 from chauffeur.planners.adversarial import harmful
 from chauffeur.planners.registry import make_planner
 from chauffeur.programs import check_source

@@ -7,8 +7,9 @@ import asyncio
 import pytest
 
 from chauffeur.concept import Instruction, Limits, Plan
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import Session, check_drive, make_world
+from chauffeur.driving.session import Session, check_drive
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 

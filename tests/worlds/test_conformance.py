@@ -13,8 +13,8 @@ from world_contract import WorldContract
 
 from chauffeur.concept import Command, Observation, Scenario, ScenarioError
 from chauffeur.concept.registry import load_plugin
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.scenarios import BUILT_IN
-from chauffeur.driving.session import make_world
 from chauffeur.geometry import Polyline, RoadGraph
 from chauffeur.worlds.conformance import MakeWorld, check_world
 from chauffeur.worlds.highway import HighwayWorld

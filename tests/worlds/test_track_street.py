@@ -14,7 +14,7 @@ pytest.importorskip("vehiclemodels")
 from chauffeur.concept import Limits, Observation, Scenario, ScenarioError, Street, Trajectory
 from chauffeur.describe.dispatch import describe
 from chauffeur.describe.street import street_ahead
-from chauffeur.driving.session import drive_policy
+from chauffeur.driving.episode import drive_policy
 from chauffeur.geometry import Pose
 from chauffeur.worlds.track import BUILT_IN, StreetReferee, TrackWorld, end_of, peak_of
 from chauffeur.worlds.track.street import draw_street, street_of

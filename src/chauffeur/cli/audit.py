@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.concept import Scenario
-    from chauffeur.driving.session_recorder import DriveRecorder
+    from chauffeur.driving.recorder import DriveRecorder
     from chauffeur.safety.audit import AuditVerification, Closing
 
 KEY_VARIABLE: Final = "CHAUFFEUR_AUDIT_KEY"
@@ -100,6 +100,23 @@ def redact_log(
     console.print(columns([("head", done.head)]))
 
 
+def audit_options() -> tuple[Path | None, bool]:
+    """What the environment says of audit logs: the key file, and whether a person's words are kept out.
+
+    Raises:
+        ConfigError: The environment says something unknown.
+    """
+    import os
+
+    from chauffeur.concept import ConfigError
+
+    private = os.environ.get(PRIVATE_VARIABLE, "")
+    if private not in ("", "0", "1"):
+        raise ConfigError(f"{PRIVATE_VARIABLE} is {private!r}.", hint="Set it to 1, or to 0.")
+    key = os.environ.get(KEY_VARIABLE)
+    return Path(key) if key else None, private == "1"
+
+
 def auditor_for(path: Path, scenario: Scenario, seed: int) -> DriveRecorder:
     """The auditor of a drive, as the environment wants it.
 
@@ -107,16 +124,10 @@ def auditor_for(path: Path, scenario: Scenario, seed: int) -> DriveRecorder:
         DataError: The log cannot be written or continued.
         ConfigError: The key cannot be used, or the environment says something unknown.
     """
-    import os
+    from chauffeur.driving.recorder import open_audit
 
-    from chauffeur.concept import ConfigError
-    from chauffeur.driving.session_recorder import open_audit
-
-    private = os.environ.get(PRIVATE_VARIABLE, "")
-    if private not in ("", "0", "1"):
-        raise ConfigError(f"{PRIVATE_VARIABLE} is {private!r}.", hint="Set it to 1, or to 0.")
-    key = os.environ.get(KEY_VARIABLE)
-    return open_audit(path, scenario, seed, key_file=Path(key) if key else None, private=private == "1")
+    key_file, private = audit_options()
+    return open_audit(path, scenario, seed, key_file=key_file, private=private)
 
 
 def tell_closing(console: Console, path: Path, closing: Closing) -> None:

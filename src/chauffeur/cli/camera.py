@@ -47,8 +47,8 @@ def camera(
     from chauffeur.cli.console import path_text, stdout
     from chauffeur.concept import ChauffeurError, ConfigError
     from chauffeur.concept.weather import WEATHERS
+    from chauffeur.driving.episode import make_world
     from chauffeur.driving.scenarios import BUILT_IN, find
-    from chauffeur.driving.session import make_world
 
     width, _, height = size.partition("x")
     if not (width.isdecimal() and height.isdecimal()):

@@ -94,9 +94,9 @@ def drive(
     from chauffeur.concept import PersonId, Result, result_of
     from chauffeur.driving.events import told_to
     from chauffeur.driving.judge.choice import referee_for
+    from chauffeur.driving.recorder import with_head
     from chauffeur.driving.scenarios import find, planner_for, suiting
     from chauffeur.driving.session import Forgetful, Session, parse_wish
-    from chauffeur.driving.session_recorder import with_head
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import personal_limits
     from chauffeur.planners.talk2drive.recent import fitting

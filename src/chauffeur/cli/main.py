@@ -18,11 +18,13 @@ from chauffeur.cli import (
     hear,
     meaning,
     page,
+    plugins,
     policies,
     replay,
     scenarios,
     talk,
     unmasking,
+    what_if,
 )
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.check import check_app
@@ -108,9 +110,20 @@ app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
 app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
-app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK)(replay.replay)
+app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK, short_help="A recorded trip again, bit for bit.")(
+    replay.replay
+)
+app.command(
+    "what-if",
+    epilog=what_if.EXAMPLES,
+    rich_help_panel=LOOK,
+    short_help="A recorded trip with another planner, side by side.",
+)(what_if.what_if)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
-app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK)(doctor.doctor)
+app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK, short_help="Check this installation.")(doctor.doctor)
+app.command(epilog=plugins.EXAMPLES, rich_help_panel=LOOK, short_help="What is installed, and of whom.")(
+    plugins.plugins
+)
 show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 show_app.command(epilog=apis.EXAMPLES)(apis.apis)
 show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)

@@ -86,11 +86,11 @@ def talk(
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
-    from chauffeur.driving.live.recorder import LiveRecorder, unanswered
     from chauffeur.driving.live.settings import Settings
     from chauffeur.driving.live.starts import Start
+    from chauffeur.driving.recorder import unanswered
     from chauffeur.driving.scenarios import find, lasting, planner_for, seeds_with_lead, suiting
-    from chauffeur.driving.session import make_world, parse_wish
+    from chauffeur.driving.session import parse_wish
     from chauffeur.driving.surroundings import services_file
     from chauffeur.driving.talk.session import WELL, Talk
     from chauffeur.driving.talk.sound import Sound
@@ -126,7 +126,7 @@ def talk(
     with ExitStack() as stack:
         left = () if audit is None else unanswered(audit)
         if audit is not None:
-            books = stack.enter_context(LiveRecorder(auditor_for(audit, place, first), make_world(place).dt_s))
+            books = stack.enter_context(auditor_for(audit, place, first))
         sound = stack.enter_context(Sound(device)) if microphone else None
         voice = Voice() if speak else None
         drive = TalkDrive(screen, stack.enter_context(_cabin()) if page else None, given, every)

@@ -25,8 +25,8 @@ def unmasking(
     from chauffeur.cli.console import stdout
     from chauffeur.concept import ScenarioError
     from chauffeur.describe.dispatch import describe
+    from chauffeur.driving.episode import make_world
     from chauffeur.driving.scenarios import find
-    from chauffeur.driving.session import make_world
     from chauffeur.hmi.unmasking_svg import unmasking_svg
     from chauffeur.planners.vilad import driving, parking
     from chauffeur.planners.vilad.engine import SHIPPED_DRIVE, shipped

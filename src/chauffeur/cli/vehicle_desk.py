@@ -10,7 +10,7 @@ from typing import Final
 
 from chauffeur.cli.lines import Lines, standard_input
 from chauffeur.cli.vehicle_screen import VehicleScreen
-from chauffeur.driving.onroad import VehicleSession
+from chauffeur.driving.onroad.session import VehicleSession
 from chauffeur.driving.onroad.spoken import listening
 from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.driving.talk.attention import Attention
@@ -21,7 +21,6 @@ from chauffeur.language.meaning.turns import answer_in
 from chauffeur.language.questions import ends_session
 
 _EVALUATE: Final = "evaluate"
-_LEAVING: Final = "You end the session."
 _LISTEN_S: Final = 0.2
 
 
@@ -49,11 +48,11 @@ class Desk:
         """One line: a wish, what the person says of the drive, or that they leave."""
         if ends_session(line):
             self.left = True
-            self._screen.say(_LEAVING)
+            self._screen.say(self._road.leaving)
             return
         first, _, rest = line.strip().partition(" ")
         if first.lower().rstrip(":,") == _EVALUATE:
-            self._screen.answer(await self._road.evaluate(rest), spoken)
+            self._screen.answer(await self._road.feedback(rest), spoken)
         else:
             source = "text" if spoken is None else "speech"
             self._screen.answer(await self._road.ask(line, source=source), spoken)

@@ -12,8 +12,7 @@ from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
 
 if TYPE_CHECKING:
-    from chauffeur.driving.onroad import VehicleRecorder
-    from chauffeur.worlds.ros.settings import VehicleSettings
+    pass
 
 DRIVE_EXAMPLES: Final = help_text("vehicle_drive DRIVE_EXAMPLES")
 
@@ -49,7 +48,7 @@ def drive(
     import asyncio
     from contextlib import ExitStack
 
-    from chauffeur.cli.audit import tell_closing
+    from chauffeur.cli.audit import audit_options, tell_closing
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import engine_named, not_kept, planner_named
@@ -57,7 +56,8 @@ def drive(
     from chauffeur.cli.vehicle_screen import VehicleScreen
     from chauffeur.concept import PersonId
     from chauffeur.describe.services.sources import read_sources
-    from chauffeur.driving.onroad import VehicleSession
+    from chauffeur.driving.onroad.session import VehicleSession
+    from chauffeur.driving.recorder import open_vehicle_audit
     from chauffeur.driving.surroundings import opened
     from chauffeur.driving.talk.sound import Sound
     from chauffeur.driving.talk.voice import Voice
@@ -72,16 +72,19 @@ def drive(
     named = engine_named(engine)  # an unknown one is refused also where nobody listens
     ear = named if microphone else None
     console = stdout()
+    dry = dry_run or settings.interface == "dry-run"
     with ExitStack() as stack:
         mind = planner_named(planner, base_url)
         books = None
         if audit is not None:  # before anything is published: a log that cannot be had is refused here
-            books = stack.enter_context(_books(audit, file, settings, dry_run=dry_run))
+            key, private_log = audit_options()
+            books = stack.enter_context(
+                open_vehicle_audit(audit, file, settings.interface, dry_run=dry, key_file=key, private=private_log)
+            )
         if private := not_kept(who):
             console.print(plain(private), style="bold yellow")
         voice = Voice() if speak else None
         sound = stack.enter_context(Sound(device)) if ear is not None else None
-        dry = dry_run or settings.interface == "dry-run"
         screen = VehicleScreen(console, settings, dry_run=dry, quiet=quiet, voice=voice)
         car = open_vehicle(settings, dry_run=dry_run)
         stack.callback(car.close)
@@ -120,28 +123,6 @@ def drive(
         raise typer.Exit(_STOPPED_WITH_CTRL_C)
     if not screen.well or (books is not None and not books.close().complete):
         raise typer.Exit(FAILED)
-
-
-def _books(path: Path, file: Path, settings: VehicleSettings, *, dry_run: bool) -> VehicleRecorder:
-    """The audit log, as the environment wants it."""
-    import os
-
-    from chauffeur.cli.audit import KEY_VARIABLE, PRIVATE_VARIABLE
-    from chauffeur.concept import ConfigError
-    from chauffeur.driving.onroad import open_recorder
-
-    private = os.environ.get(PRIVATE_VARIABLE, "")
-    if private not in ("", "0", "1"):
-        raise ConfigError(f"{PRIVATE_VARIABLE} is {private!r}.", hint="Set it to 1, or to 0.")
-    key = os.environ.get(KEY_VARIABLE)
-    return open_recorder(
-        path,
-        file,
-        settings.interface,
-        dry_run=dry_run or settings.interface == "dry-run",
-        key_file=Path(key) if key else None,
-        private=private == "1",
-    )
 
 
 def _end_on_signals() -> None:

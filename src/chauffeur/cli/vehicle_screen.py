@@ -9,8 +9,9 @@ from rich.text import Text
 
 from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
+from chauffeur.concept import Result
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.onroad import OnRoadAnswer
+from chauffeur.driving.onroad.answers import OnRoadAnswer
 from chauffeur.driving.talk.messages import HeardWords, Note, Said
 from chauffeur.driving.talk.voice import Voice
 from chauffeur.driving.talk.wish_queue import Words
@@ -82,11 +83,12 @@ class VehicleScreen:
     def answer(self, answer: OnRoadAnswer, spoken: Words | None = None) -> None:
         """What became of a wish; of a spoken one also how long after the last word that was known."""
 
-        self.well = self.well and (answer.done or answer.status == "superseded")
-        style = "bold green" if answer.done else "bold red"
+        done = answer.result is Result.DONE
+        self.well = self.well and (done or answer.status == "superseded")
+        style = "bold green" if done else "bold red"
         after = "" if spoken is None else f" ({time.monotonic() - spoken.ended_s:.2f} s after you spoke)"
         self._console.print(
-            Text.assemble(plain(f"“{answer.text}” "), (answer.status, style), " ", plain(answer.words), (after, "dim"))
+            Text.assemble(plain(f"“{answer.text}” "), (answer.result, style), " ", plain(answer.words), (after, "dim"))
         )
         if self._voice is not None:
             self._voice.say(answer.words)

@@ -39,6 +39,7 @@ def _origin() -> tuple[bool, str]:
         text = None
     found: dict[str, Any] = json.loads(text) if text else {}
     url = str(found.get("url", ""))
-    if not url.startswith("file://"):
+    path = url2pathname(urlsplit(url).path) if url.startswith("file://") else ""
+    if not path or not Path(path).exists():  # sources that an image was built from are not in it
         return False, "chauffeur"
-    return bool(found.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)
+    return bool(found.get("dir_info", {}).get("editable")), path

@@ -14,9 +14,10 @@ from typing import Any, Final, cast
 
 from chauffeur.concept import ChauffeurError, Instruction, Limits, Plan, PlannerError, PlanRequest, Scenario, Setpoints
 from chauffeur.driving.actuate import actuate
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.planning import PLAN_WITHIN_S, declined, unusable
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import Session, check_drive, make_world
+from chauffeur.driving.session import Session, check_drive
 from chauffeur.executors.base import Executor
 from chauffeur.executors.registry import BUILT_IN, MakeExecutor, OfKind, executor_for
 from chauffeur.planners.base import Planner

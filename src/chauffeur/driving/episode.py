@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from chauffeur.concept import (
+    STOP_ZONE_M,
     Causes,
     ChauffeurError,
     Command,
@@ -23,21 +25,35 @@ from chauffeur.concept import (
     Observation,
     Outcome,
     Part,
+    Policy,
+    Program,
     ProgramState,
     SandboxError,
+    Scenario,
     Setpoints,
 )
+from chauffeur.concept.registry import load_plugin
 from chauffeur.driving.actuate import actuate, set_points
 from chauffeur.driving.fallback import keep_lane_and_gap
+from chauffeur.executors import executor_for
 from chauffeur.executors.base import DriverLed, Executor, HeldSetpoints, PolicyTick, RunningPolicy
+from chauffeur.executors.program import ProgramDrive
+from chauffeur.executors.registry import OfKind
+from chauffeur.programs.sandbox import Sandbox
 from chauffeur.safety.bounds import least_target_mps
-from chauffeur.safety.shield import Shield
+from chauffeur.safety.shield import Shield, shield_for
 from chauffeur.worlds.base import EGO, World
 
 FALLBACK_S = 10.0
 """How long the fallback drives after a policy failed, before the trip is ended."""
 AFTER_END_S = 3.0
 """How long a trip without a referee goes on after its program finished."""
+
+
+def make_world(scenario: Scenario) -> World:
+    """A fresh world of the scenario's kind. Raises ConfigError for an unknown kind."""
+    world: World = load_plugin("chauffeur.worlds", scenario.world)()
+    return world
 
 
 class CommandSource(Protocol):
@@ -118,6 +134,120 @@ class Episode:
     bounded: tuple[tuple[str, int], ...] = ()
     parts: tuple[Part, ...] = ()
     judged_by: JudgedBy | Literal[""] = ""
+
+
+def trip_s(scenario: Scenario) -> float:
+    """How long a trip may take, in simulated time."""
+    return make_world(scenario).capabilities.horizon_s
+
+
+def drive_policy(
+    world: World,
+    policy: Policy,
+    referee: Referee | None,
+    max_s: float,
+    limits: Limits,
+    *,
+    watch: Callable[[Frame], None] | None = None,
+    shielded: bool = True,
+    sandbox: Sandbox | None = None,
+    minimum_speed: bool = False,
+) -> Episode:
+    """Drive a checked policy of any kind that drives simulated cars, on a world just reset.
+
+    `sandbox` lends a program one that is open already; `minimum_speed` holds it to the least speed of a highway.
+
+    Raises:
+        ScenarioError: The road has no such way, or this kind of policy drives no car here.
+    """
+    return drive_executed(
+        world,
+        policy,
+        referee,
+        max_s=max_s,
+        limits=limits,
+        shield=shield_for(world, limits) if shielded else None,
+        watch=watch,
+        minimum_speed=minimum_speed and policy.kind == "program",
+        executor=ProgramDrive(world, sandbox=sandbox) if policy.kind == "program" else None,
+    )
+
+
+def drive_program(
+    world: World,
+    source: str,
+    referee: Referee | None,
+    max_s: float,
+    watch: Callable[[Frame], None] | None = None,
+    *,
+    record: bool = True,
+    library: str = "",
+    sandbox: Sandbox | None = None,
+    shield: Shield | None = None,
+    limits: Limits | None = None,
+    minimum_speed: bool = False,
+    stop_zone_m: float = STOP_ZONE_M,
+) -> Episode:
+    """Run a checked program, with the helper functions it may call, on a world just reset.
+
+    Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
+    `sandbox` lends one that is open already; otherwise one is opened for this drive. `shield` has the last word on
+    every command, `limits` bound the set-points, and a stop within `stop_zone_m` of its sign serves it; LaMPilot's own
+    rules know neither shield nor bounds.
+    """
+    return drive_executed(
+        world,
+        Program(source, library=library),
+        referee,
+        max_s=max_s,
+        limits=limits,
+        shield=shield,
+        record=record,
+        watch=watch,
+        minimum_speed=minimum_speed,
+        executor=ProgramDrive(world, sandbox=sandbox, stop_zone_m=stop_zone_m),
+    )
+
+
+def drive_executed(
+    world: World,
+    policy: OfKind,
+    referee: Referee | None = None,
+    *,
+    max_s: float,
+    limits: Limits | None = None,
+    shield: Shield | None = None,
+    record: bool = True,
+    watch: Callable[[Frame], None] | None = None,
+    minimum_speed: bool = False,
+    executor: Executor | None = None,
+) -> Episode:
+    """The one way a policy of any kind is driven in simulated time, on a world just reset.
+
+    `executor` drives it, by default the one that is registered for its kind; it is closed in the end.
+
+    Raises:
+        ScenarioError: It cannot be driven in this world.
+        MissingExtraError: What its executor needs is not installed.
+    """
+    with closing(executor_for(policy, world) if executor is None else executor) as driving:
+        driving.start(policy, world.observe(), Limits() if limits is None else limits)
+        return run_episode(
+            world,
+            driving,
+            referee,
+            max_s=max_s,
+            record=record,
+            watch=watch,
+            shield=shield,
+            limits=limits,
+            minimum_speed=minimum_speed,
+        )
+
+
+def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
+    """Let the world's own driver keep its initial wishes: the IDM baseline."""
+    return run_episode(world, None, referee, max_s=max_s, **options)
 
 
 def run_episode(

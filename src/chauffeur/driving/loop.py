@@ -12,7 +12,6 @@ F  feedback           what the person says afterwards; it reaches H of the next 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 from chauffeur.concept import (
@@ -25,17 +24,14 @@ from chauffeur.concept import (
     Observation,
     PersonId,
     Plan,
-    PlanRequest,
-    Scenario,
     SystemMessage,
     Trip,
     Verdict,
 )
 from chauffeur.driving.emergency import not_checked, planned_for
 from chauffeur.driving.events import DriveEvent, Listener, nobody_listens
-from chauffeur.driving.planning import RECALLED, Judged, PlanSteps, no_pictures, plan_once
+from chauffeur.driving.planning import RECALLED, Judged, Planned, PlanSteps, no_pictures, plan_once
 from chauffeur.planners.base import Planner
-from chauffeur.worlds.base import World
 
 
 class LoopMemory(Protocol):
@@ -45,55 +41,59 @@ class LoopMemory(Protocol):
     def remember(self, trip: Trip, feedback: Feedback | None) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
-class Stages:
-    """The loop's exchangeable parts; `see` takes pictures for planners that look, `shows` gives them the instant."""
+async def drive(I: Instruction, steps: PlanSteps, execute: Callable[[Planned], Trip], memory: LoopMemory) -> Trip:  # noqa: E741, N803
+    """One wish, from the words to the remembered trip."""
+    planned = await plan_once(I, steps)  # C, H, S, R, P, V
 
-    world: World
-    describe: Callable[[Observation], Context]
-    memory: LoopMemory
-    system: Callable[[Limits], SystemMessage]
-    planner: Planner
-    check: Callable[[Plan, Observation, Limits], tuple[Verdict, ...]]
-    execute: Callable[[PlanRequest, Plan, tuple[Verdict, ...], Scenario, int], Trip]
-    tell: Listener = nobody_listens
-    see: Callable[[Observation], tuple[CameraImage, ...]] = no_pictures
-    shows: bool = True
+    trip = execute(planned)  # P, if no verdict stops it
+    steps.tell(DriveEvent("trip", value=trip))
+
+    memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks
+    return trip
 
 
-def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSteps:
-    """The way from words to a checked plan, at an instant of a world that waits for it."""
+def steps_at(
+    observation: Observation,
+    planner: Planner,
+    memory: LoopMemory,
+    limits: Limits,
+    *,
+    describe: Callable[[Observation], Context],
+    system: Callable[[Limits], SystemMessage],
+    check: Callable[[Plan, Observation, Limits], tuple[Verdict, ...]],
+    tell: Listener = nobody_listens,
+    see: Callable[[Observation], tuple[CameraImage, ...]] = no_pictures,
+    shows: bool = True,
+) -> PlanSteps:
+    """The way from words to a checked plan, at an instant of a world that waits for it.
 
-    async def describe() -> Context:
-        return stages.describe(observation)
+    Args:
+        observation: The instant.
+        planner, memory, limits: Of the wish.
+        describe, system, check: C, S and V.
+        tell: Hears each letter as it comes.
+        see: Takes pictures, for planners that look.
+        shows: Whether the planner is given the instant.
+    """
 
-    async def recall(I: Instruction, C: Context) -> History:  # noqa: E741, N803
-        return stages.memory.recall(I.person, I, C, RECALLED)
+    async def described() -> Context:
+        return describe(observation)
 
-    async def check(plan: Plan, own: bool) -> Judged:
-        return (not_checked(plan) if own else stages.check(plan, observation, limits)), observation
+    async def recalled(I: Instruction, C: Context) -> History:  # noqa: E741, N803
+        return memory.recall(I.person, I, C, RECALLED)
+
+    async def judged(plan: Plan, own: bool) -> Judged:
+        return (not_checked(plan) if own else check(plan, observation, limits)), observation
 
     return PlanSteps(
-        planner=stages.planner,
+        planner=planner,
         limits=limits,
-        describe=describe,
-        recall=recall,
-        system=lambda: stages.system(limits),
+        describe=described,
+        recall=recalled,
+        system=lambda: system(limits),
         own=lambda text: planned_for(text, observation),
-        check=check,
-        see=lambda: stages.see(observation),
-        observe=lambda: observation if stages.shows else None,
-        tell=stages.tell,
+        check=judged,
+        see=lambda: see(observation),
+        observe=lambda: observation if shows else None,
+        tell=tell,
     )
-
-
-async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
-    """One wish, from the words to the remembered trip."""
-    observation = stages.world.reset(scenario, seed)
-    planned = await plan_once(I, steps_of(stages, observation, limits))  # C, H, S, R, P, V
-
-    trip = stages.execute(planned.request, planned.plan, planned.verdicts, scenario, seed)  # P, if no verdict stops it
-    stages.tell(DriveEvent("trip", value=trip))
-
-    stages.memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks
-    return trip

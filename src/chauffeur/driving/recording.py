@@ -129,12 +129,14 @@ class Difference:
         field: Path of the value, e.g. `observation.ego.speed_mps`.
         first: Value in the first trip, as text.
         second: Value in the second.
+        time_s: Simulated time of that control period.
     """
 
     tick: int | None
     field: str
     first: str
     second: str
+    time_s: float | None = None
 
     def __str__(self) -> str:
         where = "" if self.tick is None else f"tick {self.tick}, "
@@ -194,17 +196,16 @@ def compare_trips(first: RecordedTrip, second: RecordedTrip) -> Difference | Non
     Compared are the frames, the final instant, outcome, metrics and what was said. Latencies, versions and other
     provenance may differ between equal drives. Of a recording that was cut off, the frames that it holds are compared.
     """
-    if first.cut_off or second.cut_off:
-        held = min(len(first.frames), len(second.frames))
-        pairs_held = zip(first.frames[:held], second.frames[:held], strict=True)
-        found = ((index, _difference(one, other)) for index, (one, other) in enumerate(pairs_held))
-        return next((Difference(index, *difference) for index, difference in found if difference), None)
     for index, (one, other) in enumerate(zip(first.frames, second.frames, strict=False)):
         if (found := _difference(one, other)) is not None:
-            return Difference(index, *found)
+            return Difference(index, *found, time_s=one.observation.time_s)
+    if first.cut_off or second.cut_off:
+        return None
     if len(first.frames) != len(second.frames):
         shared = min(len(first.frames), len(second.frames))
-        return Difference(shared, "number of frames", str(len(first.frames)), str(len(second.frames)))
+        longer = max(first.frames, second.frames, key=len)
+        counts = str(len(first.frames)), str(len(second.frames))
+        return Difference(shared, "number of frames", *counts, time_s=longer[shared].observation.time_s)
     pairs: tuple[tuple[str, Any, Any], ...] = (
         ("final", first.final, second.final),
         ("outcome", first.trip.outcome, second.trip.outcome),

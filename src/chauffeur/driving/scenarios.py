@@ -11,7 +11,7 @@ from pathlib import Path
 
 from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.concept.utterance import ReferenceKind, Verb
-from chauffeur.driving.session import drive_without_program, make_world
+from chauffeur.driving.episode import drive_without_program, make_world
 from chauffeur.language.languages.reader import read_other
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.quantities import measured

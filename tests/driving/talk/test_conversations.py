@@ -19,12 +19,12 @@ from chauffeur.concept import (
     Situation,
     Thoughts,
 )
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.events import DriveEvent
 from chauffeur.driving.live.plan_messages import Request
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Interaction
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import make_world
 from chauffeur.driving.talk import verdicts
 from chauffeur.driving.talk.conversations import MOST_SAID_SHOWN, Conversations, recalled_of, source_of
 from chauffeur.driving.talk.messages import Conversation, HowWasIt

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import pytest
 
 from chauffeur.concept import Observation
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.session import make_world
 from chauffeur.driving.talk import seat_view
 from chauffeur.driving.talk.messages import Conversation, Said, Say, SeatView, ShowSeat
 from chauffeur.driving.talk.seat_view import SeatWindow

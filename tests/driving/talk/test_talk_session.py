@@ -34,7 +34,7 @@ from chauffeur.driving.talk.messages import (
     Stop,
     TakeOver,
 )
-from chauffeur.driving.talk.session import LEAVING, Talk
+from chauffeur.driving.talk.session import Talk
 
 ANA = PersonId("ana")
 PLACE = find("left-lane")
@@ -191,7 +191,7 @@ def test_what_goes_wrong_is_told_and_what_is_said_beside_a_wish_does_not_end_it(
 
         talk.take(Say("Quit, please."))
         assert talk.stopping
-        assert LEAVING in [note.text for note in person.all(Note)]  # pyright: ignore
+        assert Talk.leaving in [note.text for note in person.all(Note)]  # pyright: ignore
         assert person.conversation("w10") is None
         talk.abort()
 

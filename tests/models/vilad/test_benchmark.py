@@ -11,7 +11,7 @@ from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.lampilot.rollout import plan_adapter
 from chauffeur.concept import ConfigError, Frame, Parameters, Plan, Thoughts
 from chauffeur.describe.dispatch import describe
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 from chauffeur.models.vilad.benchmark import InstructionBenchmark, InstructionItem, drive_statistics
 from chauffeur.planners.vilad.driving import reference
 from chauffeur.planners.vilad.driving_planning import trajectory_of

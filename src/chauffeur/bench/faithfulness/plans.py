@@ -11,7 +11,7 @@ import numpy as np
 
 from chauffeur.concept import LAMPILOT_LIMITS, Situation
 from chauffeur.describe import describe
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.exemplars import Filled, program_of
 from chauffeur.planners.onboard.options import Chosen, Declined

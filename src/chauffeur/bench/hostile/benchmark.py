@@ -24,7 +24,7 @@ from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.passengers.scenes import SCENES as _STARTS
 from chauffeur.concept import LAMPILOT_LIMITS, Limits, Plan, PlanRequest, Scenario
-from chauffeur.driving.session import scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.version import __version__

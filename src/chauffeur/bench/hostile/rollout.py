@@ -22,9 +22,8 @@ from chauffeur.concept import (
     Scenario,
     stops_at_sign,
 )
-from chauffeur.driving.episode import Episode
+from chauffeur.driving.episode import Episode, drive_policy, make_world
 from chauffeur.driving.planning import checked
-from chauffeur.driving.session import drive_policy, make_world
 
 ROLLOUT_VERSION: Final = "hostile-rollout-v2"
 """Changes whenever the same plan could drive, or be described, differently."""

@@ -24,7 +24,7 @@ from chauffeur.bench.kernel.stages import StageStore
 from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context, Scenario
 from chauffeur.describe import describe
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 
 Watch = Callable[[Standing], None]
 """Is told where the run stands, a few times a second."""

@@ -41,10 +41,11 @@ from chauffeur.concept import (
     Usage,
 )
 from chauffeur.describe import describe
+from chauffeur.driving.episode import drive_program, make_world
 from chauffeur.driving.judge.choice import referee_for
-from chauffeur.driving.planning import checked, screened_request
+from chauffeur.driving.planning import Planned, checked, screened_request
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import drive_program, make_trip, make_world, scenario_hash
+from chauffeur.driving.trips import make_trip, scenario_hash
 from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
 from chauffeur.memory.policies_entry import Describer, Judge, PolicyEntry, content_id, fitting_name
 from chauffeur.planners.base import Planner, Writer
@@ -293,7 +294,7 @@ class Coach:
         else:
             plan, names = _plan_adapter.validate_python(pending["plan"]), pending["offered"]
         found = checked(plan, observation, self.limits)
-        verdicts, refusal = found.verdicts, found.refusal
+        refusal = found.refusal
         if not refusal and not isinstance(plan.policy, Program):
             refusal = "The planner gave no program."
         episode = None
@@ -303,7 +304,7 @@ class Coach:
             episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library)
             if episode.causes.infra_failed:  # says nothing about the program, so nobody judges it
                 raise SandboxError(episode.causes.detail)
-        trip = make_trip(request, plan, verdicts, item.scenario, item.scenario.seed, episode, refusal)
+        trip = make_trip(Planned(plan, found.verdicts, request), item.scenario, item.scenario.seed, episode, refusal)
         recorded = RecordedTrip(
             trip,
             () if episode is None else episode.frames,

@@ -17,7 +17,7 @@ import numpy as np
 from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.stages import Manifest, parsed
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Limits, Scenario
-from chauffeur.driving.session import scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.prompts import Setting
 from chauffeur.worlds.highway.dblv1 import Dataset, Item
 

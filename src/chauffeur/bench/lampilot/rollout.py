@@ -13,11 +13,10 @@ from pydantic import TypeAdapter
 
 from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario
-from chauffeur.driving.episode import Episode
+from chauffeur.driving.episode import Episode, drive_program, drive_without_program
 from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.driving.judge.metrics import ANY_STOP_M
 from chauffeur.driving.planning import checked
-from chauffeur.driving.session import drive_program, drive_without_program
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.library import standalone
 from chauffeur.safety.checks import run_checks

@@ -34,8 +34,9 @@ from chauffeur.describe import describe
 from chauffeur.driving.judge.goals import GIVE_UP_S, HOLD_S
 from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.driving.judge.metrics import points, ruler_named
+from chauffeur.driving.planning import Planned
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import make_trip
+from chauffeur.driving.trips import make_trip
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
@@ -231,7 +232,7 @@ def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[Recor
     context = kept.context(row) or describe(observation)
     request = PlanRequest(Instruction(str(row["command"]), source="benchmark"), context, SystemMessage(""))
     made = plan or Plan(Thoughts(""), None, planner=str(row.get("planner", "")))
-    trip = make_trip(request, made, kept.verdicts(row), scenario, scenario.seed, episode, "")
+    trip = make_trip(Planned(made, kept.verdicts(row), request), scenario, scenario.seed, episode)
     return RecordedTrip(trip, episode.frames, scenario, final=episode.final), note
 
 

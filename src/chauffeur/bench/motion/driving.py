@@ -12,8 +12,9 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.rollout import plan_adapter
 from chauffeur.bench.motion.scoring import SCORE_VERSION, measured
 from chauffeur.concept import ActionMatrix, ChauffeurError, Limits, Plan, Scenario
+from chauffeur.driving.episode import drive_policy
 from chauffeur.driving.planning import checked
-from chauffeur.driving.session import drive_policy, scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.prompts.motion import MODERATE
 from chauffeur.worlds.track import TrackWorld
 

@@ -37,18 +37,17 @@ from chauffeur.concept import (
     Limits,
     Observation,
     PersonId,
-    Plan,
-    PlanRequest,
     Scenario,
     SystemMessage,
     Trip,
-    Verdict,
 )
 from chauffeur.concept.weather import WEATHERS
 from chauffeur.describe.track import describe_track
-from chauffeur.driving.episode import Episode
-from chauffeur.driving.loop import LoopMemory, Stages, drive
-from chauffeur.driving.session import Forgetful, check_drive, declined, drive_policy, make_trip
+from chauffeur.driving.episode import Episode, drive_policy
+from chauffeur.driving.loop import LoopMemory, drive, steps_at
+from chauffeur.driving.planning import Planned
+from chauffeur.driving.session import Forgetful, check_drive
+from chauffeur.driving.trips import make_trip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
@@ -290,13 +289,11 @@ class _Sitting:
     ) -> tuple[Trip, Judgement]:
         driven: list[Episode] = []
 
-        def execute(
-            request: PlanRequest, plan: Plan, verdicts: tuple[Verdict, ...], scenario: Scenario, seed: int
-        ) -> Trip:
-            refusal = declined(plan, verdicts)
-            if not refusal and isinstance(plan.policy, ActionMatrix):
-                driven.append(_driven(frozen(scenario), plan.policy))
-            return make_trip(request, plan, verdicts, scenario, seed, driven[-1] if driven else None, refusal)
+        def execute(planned: Planned) -> Trip:
+            policy = planned.plan.policy
+            if not planned.refusal and isinstance(policy, ActionMatrix):
+                driven.append(_driven(frozen(item.scenario), policy))
+            return make_trip(planned, item.scenario, item.seed, driven[-1] if driven else None, planned.refusal)
 
         def see(observation: Observation) -> tuple[CameraImage, ...]:
             del observation  # the item renders its own beginning, and another place for each command
@@ -305,10 +302,18 @@ class _Sitting:
         def describe(observation: Observation) -> Context:
             return item.told(describe_track(observation), "told")
 
-        stages = Stages(TrackWorld(), describe, memory, _no_system, planner, check_drive, execute, see=see)
-        trip = await drive(
-            Instruction(item.command.text, person, source="benchmark"), item.scenario, item.seed, Limits(), stages
+        steps = steps_at(
+            TrackWorld().reset(item.scenario, item.seed),
+            planner,
+            memory,
+            Limits(),
+            describe=describe,
+            system=_no_system,
+            check=check_drive,
+            see=see,
         )
+        wish = Instruction(item.command.text, person, source="benchmark")
+        trip = await drive(wish, steps, execute, memory)
         policy = trip.plan.policy if driven and isinstance(trip.plan.policy, ActionMatrix) else None
         return trip, judged(self._manner, want, policy, trip.outcome, item.command.manoeuvre)
 

@@ -22,7 +22,7 @@ from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
 from chauffeur.bench.personalization.study import BENCH_VERSION, StudyConfig, StudyJob, versions
 from chauffeur.concept import ConfigError
-from chauffeur.driving.session import scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.registry import make_planner
 from chauffeur.version import __version__
 

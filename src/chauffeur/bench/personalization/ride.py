@@ -24,19 +24,18 @@ from chauffeur.concept import (
     Limits,
     Parameters,
     PersonId,
-    Plan,
-    PlanRequest,
     Policy,
     Scenario,
     ScenarioError,
     SystemMessage,
     Trip,
-    Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.driving.episode import Episode, Referee
-from chauffeur.driving.loop import LoopMemory, Stages, drive
-from chauffeur.driving.session import check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.driving.episode import Episode, Referee, drive_policy, make_world
+from chauffeur.driving.loop import LoopMemory, drive, steps_at
+from chauffeur.driving.planning import Planned
+from chauffeur.driving.session import check_drive
+from chauffeur.driving.trips import make_trip
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.privacy import Privacy
 from chauffeur.memory.vault import VaultMemory
@@ -126,23 +125,31 @@ async def ride(
     world = make_world(scene)
     felt: list[tuple[Trace, bool]] = []
 
-    def execute(request: PlanRequest, plan: Plan, verdicts: tuple[Verdict, ...], scenario: Scenario, seed: int) -> Trip:
-        refusal = declined(plan, verdicts)
-        policy = plan.policy
+    def execute(planned: Planned) -> Trip:
+        refusal = planned.refusal
+        policy = planned.plan.policy
         if not refusal and policy is not None:
             try:
-                episode, trace = _drive(world, scenario, policy, task, request.limits)
+                episode, trace = _drive(world, scene, policy, task, limits)
             except ScenarioError as error:  # no such way here
                 refusal = str(error)
             else:
                 felt.append((trace, False))
-                return make_trip(request, plan, verdicts, scenario, seed, episode, "", shielded=True)
-        _, trace = _drive(world, scenario, as_it_was(world, task), task, request.limits)
+                return make_trip(planned, scene, scene.seed, episode, shielded=True)
+        _, trace = _drive(world, scene, as_it_was(world, task), task, limits)
         felt.append((trace, True))
-        return make_trip(request, plan, verdicts, scenario, seed, None, refusal, shielded=True)
+        return make_trip(planned, scene, scene.seed, None, refusal, shielded=True)
 
-    stages = Stages(world, describe, memory, _system, planner, check_drive, execute)
-    trip = await drive(Instruction(words, person, source="benchmark"), scene, scene.seed, limits, stages)
+    steps = steps_at(
+        world.reset(scene, scene.seed),
+        planner,
+        memory,
+        limits,
+        describe=describe,
+        system=_system,
+        check=check_drive,
+    )
+    trip = await drive(Instruction(words, person, source="benchmark"), steps, execute, memory)
     trace, refused = felt[-1]
     return Ride(trip, trace, refused)
 

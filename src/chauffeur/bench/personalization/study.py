@@ -40,7 +40,8 @@ from chauffeur.bench.personalization.takeover import (
 )
 from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace, limit_of
 from chauffeur.concept import NOBODY, Limits, Parameters, Scenario
-from chauffeur.driving.session import Forgetful, make_world
+from chauffeur.driving.episode import make_world
+from chauffeur.driving.session import Forgetful
 from chauffeur.planners.talk2drive.recent import RecentToo
 
 BENCH_VERSION: Final = "personalization-v3"

@@ -37,9 +37,10 @@ from chauffeur.concept import (
 from chauffeur.concept.data import data_folder
 from chauffeur.concept.utterance import Act, Reference, Utterance, acts_from_json
 from chauffeur.describe import describe
+from chauffeur.driving.episode import drive_policy, make_world
 from chauffeur.driving.judge.referee import ActsReferee
 from chauffeur.driving.planning import checked, screened_request
-from chauffeur.driving.session import drive_policy, make_world, scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.meaning.compose import references_of
 from chauffeur.planners.registry import make_planner

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal, cast, get_args
 
@@ -268,6 +269,21 @@ class LiveSetpoints:
             steered=None if fields.get("steered") is None else Steered.read(fields["steered"]),
             handovers=_count(fields, "handovers"),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class LiveEnd:
+    """How a drive in real time ended.
+
+    Attributes:
+        outcome: As control reported it, or what became of control.
+        figures: Punctuality of control, as far as it could still tell.
+        lost_reports: Control periods that were never heard of.
+    """
+
+    outcome: str
+    figures: Mapping[str, Any]
+    lost_reports: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from typing import Any, Final, Literal, Self
 from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.driving.emergency import STOPPING, stop_wanted
 from chauffeur.driving.events import FINAL, DriveEvent, EventKind, Listener, nobody_listens
+from chauffeur.driving.judge.account import result_of_event
 from chauffeur.driving.live.__main__ import FIGURES_FILE, READY_SUFFIX
 from chauffeur.driving.live.messages import Key, LiveSetpoints, MessageError, Report, WheelHand
 from chauffeur.driving.live.plan_messages import (
@@ -125,11 +126,12 @@ class Runtime:
         self._own = folder is None
         self.folder = _new_folder() if folder is None else folder
         settings.write(self.folder)
+        self._settings = settings
         self._rings = {name: ring(self.folder, name, create=True) for name in SIZES}
         self._heard = {name: Reader(self._rings[name], old=True) for name in _HEARD}
         self.interactions: dict[str, Interaction] = {}
         self.report: Report | None = None
-        self.lost_reports = self.lost_briefs = 0
+        self.lost_reports = 0
         self.replaced: list[DriveEvent] = []
         self._children: dict[Role, _Child] = {}
         self._wish_number, self._wish_at_s = 0, time.monotonic()
@@ -140,6 +142,7 @@ class Runtime:
 
     def __enter__(self) -> Self:
         try:
+            self._tell(DriveEvent("begun", value=self._settings))
             self._wait_until_ready()
         except BaseException:
             self.close()
@@ -454,7 +457,9 @@ class Runtime:
             self._close(interaction, DriveEvent("interrupted", wish, "The process that drove it died."))
 
     def _close(self, interaction: Interaction, answer: DriveEvent) -> None:
-        interaction.stage, interaction.answer = "closed", replace(answer, final=True)
+        plan = None if interaction.brief is None else interaction.brief.plan
+        result = result_of_event(answer.kind, interaction.request.text, plan)
+        interaction.stage, interaction.answer = "closed", replace(answer, final=True, result=result)
         interaction.events.append(interaction.answer)
         self._tell(interaction.answer)
 
@@ -473,13 +478,15 @@ class Runtime:
 
     def _hear_briefs(self) -> None:
         messages, lost = self._heard["briefs"].news()
-        self.lost_briefs += lost
+        briefs: list[PlanningInputs] = []
         for message in messages:
             try:
-                brief = read_brief(message.payload)
+                briefs.append(read_brief(message.payload))
             except MessageError:
-                self.lost_briefs += 1
-                continue
+                lost += 1
+        if lost:
+            self._tell(DriveEvent("lost", text="what plans were made of was not heard in time", value=lost))
+        for brief in briefs:
             if brief.wish in self.interactions:
                 self.interactions[brief.wish].brief = brief
             context = DriveEvent("context", brief.wish, trip=brief.trip, tick=brief.tick, value=brief.context)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Feedback, Parameters, Plan, Verdict
+from chauffeur.concept import ASKS, Feedback, Parameters, Plan, Result, Verdict
 from chauffeur.worlds.ros.base import Published, RosVehicleState
 
 Status = Literal[
@@ -26,8 +26,11 @@ nothing was published. `refused`: a check, or the vehicle's own limits. `decline
 parameters. `failed`: no plan could be had. `superseded`: a newer wish came before anything was published.
 `taken`: feedback, kept. `answered`: it was a question, and what is in force stays."""
 
-DONE: Final[frozenset[Status]] = frozenset({"delivered", "dry-run", "taken", "answered"})
-"""What a person wished was done, as far as can be known here."""
+_RESULTS: Final[dict[Status, Result]] = {
+    "delivered": Result.DONE, "dry-run": Result.DONE, "taken": Result.DONE, "answered": Result.DONE,
+    "unconfirmed": Result.NOT_DONE, "unreachable": Result.NOT_DONE, "superseded": Result.NOT_DONE,
+    "refused": Result.DECLINED, "declined": Result.DECLINED, "failed": Result.FAILED,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +64,12 @@ class OnRoadAnswer:
     took_s: float = 0.0
 
     @property
-    def done(self) -> bool:
-        """Whether it was done, as far as can be known here."""
-        return self.status in DONE
+    def result(self) -> Result:
+        """What became of it in the words of every drive, as far as can be known here."""
+        plan = self.plan
+        if self.status == "declined" and plan is not None and (plan.offer or plan.intent == ASKS):
+            return Result.ASKED_BACK
+        return _RESULTS[self.status]
 
 
 @dataclass(frozen=True, slots=True)

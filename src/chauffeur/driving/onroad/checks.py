@@ -14,7 +14,7 @@ from chauffeur.concept import Parameters, Plan, Verdict
 from chauffeur.driving.emergency import stop_wanted
 from chauffeur.driving.onroad.thoughts import in_own_words, speed_text
 from chauffeur.driving.onroad.vehicle_observation import VehicleObservation
-from chauffeur.language.emergency import read_emergency
+from chauffeur.language.emergency import Emergency, read_emergency
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
 from chauffeur.worlds.ros import VehicleLimits
 
@@ -47,13 +47,10 @@ def is_stop(text: str) -> bool:
     return stop_wanted(read_emergency(text))
 
 
-def answered_at_once(text: str) -> str:
-    """What is said to words that ask nothing of this vehicle's planner but are no remark either; empty for others.
-
-    Where to stop is chosen by the vehicle; what it can be asked for at once is a speed of 0.
-    """
-    found = read_emergency(text)
-    if found is None or not found.alone or found.kind == "stop":
+def answered_at_once(found: Emergency) -> str:
+    """What is said to emergency words that ask nothing of this vehicle's planner; empty for a stop, and for words that
+    ask for more."""
+    if not found.alone or found.kind == "stop":
         return ""
     if found.kind == "no_stop":
         return "I ask for no stop. What was asked of the vehicle stays in force."

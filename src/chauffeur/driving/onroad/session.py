@@ -2,7 +2,7 @@
 
     async with VehicleSession(vehicle, settings, planner, tell=show) as road:
         answer = await road.ask("Drive a bit slower.")
-        answer = await road.evaluate("Too slow now.")
+        answer = await road.feedback("Too slow now.")
 
 `ask` answers when it is known what became of the wish. While one is being planned, a newer one takes its place. The way
 to the vehicle is watched all the time and told of in events. Whoever uses a session asks for nothing twice: interfaces
@@ -36,12 +36,14 @@ from chauffeur.concept import (
     PersonId,
     Plan,
     PlanRequest,
+    Scenario,
     SystemMessage,
     Thoughts,
     Trip,
     Verdict,
 )
 from chauffeur.describe.services.sources import Sources
+from chauffeur.driving.drive_session import DriveSession, Entrance
 from chauffeur.driving.events import DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.driving.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult, Status
 from chauffeur.driving.onroad.checks import (
@@ -52,10 +54,8 @@ from chauffeur.driving.onroad.checks import (
     is_about_engaging,
     is_stop,
 )
-from chauffeur.driving.onroad.recorder import VehicleRecorder
 from chauffeur.driving.onroad.thoughts import refused_in_own_words, speed_text
-from chauffeur.driving.onroad.trips import make_trip
-from chauffeur.driving.onroad.vehicle_observation import VehicleObservation, counted_from, describe_vehicle
+from chauffeur.driving.onroad.vehicle_observation import WORLD, VehicleObservation, counted_from, describe_vehicle
 from chauffeur.driving.planning import (
     PLAN_WITHIN_S,
     RECALLED,
@@ -65,11 +65,11 @@ from chauffeur.driving.planning import (
     PlanSteps,
     plan_once,
 )
-from chauffeur.driving.questions import NOT_MEANT, NOTHING_ASKED, TAKEN_BACK, Conversing
+from chauffeur.driving.questions import NOT_MEANT, TAKEN_BACK, Conversing
+from chauffeur.driving.recorder import FLUSH_TIMEOUT_S, DriveRecorder
 from chauffeur.driving.session import MAX_WISH_CHARACTERS
-from chauffeur.driving.session_recorder import FLUSH_TIMEOUT_S
-from chauffeur.language.meaning.reader import read
-from chauffeur.language.meaning.turns import cancels, takes_back
+from chauffeur.driving.trips import vehicle_trip
+from chauffeur.language.emergency import Emergency, read_emergency
 from chauffeur.language.questions import said_aside
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
@@ -124,7 +124,7 @@ _CANCEL: Final = "cancel"
 _SUPERSEDED: Final = _Made(status="superseded", words="A newer wish came.")
 
 
-class VehicleSession:
+class VehicleSession(DriveSession):
     """Takes a person's wishes to a vehicle. Used in one event loop; `async with` begins and ends it."""
 
     def __init__(
@@ -136,7 +136,7 @@ class VehicleSession:
         person: PersonId = NOBODY,
         memory: Memory | None = None,
         sources: Sources | None = None,
-        books: VehicleRecorder | None = None,
+        books: DriveRecorder | None = None,
         tell: Listener = nobody_listens,
         confirm_within_s: float = CONFIRM_WITHIN_S,
         clock: Callable[[], datetime] = utc_now,
@@ -167,12 +167,15 @@ class VehicleSession:
                 hint="Remove [constant_speed] from the file, or use: chauffeur vehicle apply",
             )
         self._vehicle, self._settings, self._planner = vehicle, settings, planner
-        self._person, self._memory, self._sources, self._books = person, memory, sources, books
-        self._tell, self._confirm_within_s = tell, confirm_within_s
+        super().__init__(person, books)
+        self.subscribe(tell)
+        self._memory, self._sources, self._confirm_within_s = memory, sources, confirm_within_s
         most_mps = stack.limits.max_speed_mps
         self.limits: Final = personal_limits(person, Limits("vehicle", max_over_limit_mps=0.0, max_speed_mps=most_mps))
         self.dry_run: Final = vehicle.state().link == "dry-run"
-        self._began = clock().isoformat(timespec="milliseconds")
+        began = clock().isoformat(timespec="milliseconds")  # two sessions' trips are never the same
+        about = {"interface": settings.interface, "dry_run": self.dry_run, "began": began}
+        self._scenario = Scenario(f"{WORLD}:{settings.interface}", WORLD, about, 0)
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
@@ -220,6 +223,11 @@ class VehicleSession:
             self._say("over", words, value=self._asked)
         return words
 
+    def take_over(self, on: bool) -> None:
+        """Refuse: the wheel of a vehicle is the person's, and no program gives it back."""
+        del on
+        raise ConfigError(ENGAGING_WORDS)
+
     async def ask(self, text: str, *, source: Literal["text", "speech"] = "text") -> OnRoadAnswer:
         """Answer one wish. A newer call takes the place of an older one that has not reached the vehicle; a question
         waits for it, and takes the place of none.
@@ -265,7 +273,7 @@ class VehicleSession:
         words = f"{why} It had been published: {published.words}"
         return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "unconfirmed", words, published=published)
 
-    async def evaluate(self, text: str) -> OnRoadAnswer:
+    async def feedback(self, text: str) -> OnRoadAnswer:
         """Keep what the person says of the drive with their last trip."""
         if is_stop(text):
             return await self.ask(text)
@@ -295,25 +303,28 @@ class VehicleSession:
         self, number: int, text: str, source: Literal["text", "speech"]
     ) -> tuple[OnRoadAnswer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
-        if takes_back(text) and not self._talk.open and (self._before is None or not cancels(text)):
-            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "answered", NOTHING_ASKED), None
+        entrance = self.enter(text)
+        at_once = OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "answered", entrance.words)
+        if entrance.way in ("nothing", "leave"):
+            return at_once, None
         try:
             meant = self._talk.settle(text, self._person)
         except InstructionError as error:
-            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
+            return replace(at_once, status="declined", words=str(error)), None
         if meant is None:
-            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "declined", NOT_MEANT), None
+            return replace(at_once, status="declined", words=NOT_MEANT), None
         instruction = replace(meant, source=source)
+        entrance = self.enter(instruction.text) if entrance.way == "yes" else entrance
         answer = OnRoadAnswer(number, instruction.text, "declined", ENGAGING_WORDS)
         self._say("wish", instruction.text, number, instruction)
-        if is_about_engaging(instruction.text) and not is_stop(instruction.text):
+        if is_about_engaging(instruction.text) and entrance.way != "stop":
             return answer, None
-        if words := answered_at_once(instruction.text):
-            return replace(answer, words=words), None
+        if entrance.way in ("distress", "go_on"):
+            return replace(answer, words=entrance.words), None
         state = self._observed()
         if state.link not in _USABLE:
             return replace(answer, status="unreachable", words=_unreachable(state)), None
-        if self._last_trip and not is_stop(instruction.text) and read(instruction.text).address == "feedback":
+        if entrance.way == "opinion":
             await self._keep_feedback(number, instruction.text)  # and planned: it may ask for something else now
         begun = time.perf_counter()
         made = await self._made(number, instruction)
@@ -407,11 +418,30 @@ class VehicleSession:
             return replace(made, status="failed", words=words)
         return made
 
+    def _urgent(self, found: Emergency) -> Entrance | None:
+        """Where to stop is chosen by the vehicle; what it can be asked for at once is a speed of 0."""
+        if found.kind == "stop":
+            return Entrance("stop")
+        words = answered_at_once(found)
+        return Entrance("go_on" if found.kind == "no_stop" else "distress", words) if words else None
+
+    @property
+    def _question_is_open(self) -> bool:
+        return self._talk.open
+
+    @property
+    def _was_driven(self) -> bool:
+        return bool(self._last_trip)
+
+    def _takes_back(self, cancelled: bool) -> bool:
+        return cancelled and self._before is not None
+
     def _own(self, text: str) -> Plan | None:
         """The session's own plan: a speed of 0 for a stop, and words for distress."""
         if is_stop(text):
             return self._stop_plan()
-        words = answered_at_once(text)
+        found = read_emergency(text)
+        words = "" if found is None else answered_at_once(found)
         return Plan(Thoughts(words), None, words, intent="ask", planner="onroad") if words else None
 
     def _taken_back(self) -> Plan | None:
@@ -451,8 +481,8 @@ class VehicleSession:
         if self._books is not None:
             slows = parameters.target_speed_mps <= (0.0 if before is None else before.target_speed_mps)
             within_s = BRIEFLY_S if slows else FLUSH_TIMEOUT_S
-            if not await asyncio.to_thread(self._books.kept, within_s):
-                why = f"The audit log could not be written in time. {self._books.trouble}".rstrip()
+            if not await asyncio.wrap_future(self._books.kept(within_s)):
+                why = f"The audit log could not be written in time. {self._books.log.trouble}".rstrip()
                 if not slows:
                     return replace(answer, status="failed", words=f"{why} Nothing was published.")
                 self._say("trouble", f"{why} A lower speed is asked for all the same.", number)
@@ -548,18 +578,7 @@ class VehicleSession:
 
     async def _remember(self, request: PlanRequest, answer: OnRoadAnswer) -> OnRoadAnswer:
         assert answer.plan is not None
-        trip = make_trip(
-            request,
-            answer.plan,
-            answer.verdicts,
-            answer.status,
-            answer.words,
-            number=answer.wish,
-            began=self._began,
-            interface=self._settings.interface,
-            dry_run=self.dry_run,
-            confirmed_s=answer.confirmed_s,
-        )
+        trip = vehicle_trip(request, answer.plan, answer, self._scenario)
         await self._keep(answer.wish, trip)
         return replace(answer, trip=trip.id)
 
@@ -591,14 +610,7 @@ class VehicleSession:
     # Words ------------------------------------------------------------------------------------------------------------
 
     def _say(self, kind: EventKind, text: str, wish: int = 0, value: EventValue | None = None) -> None:
-        """Tell the books, then whoever else listens."""
-        event = DriveEvent(kind, str(wish) if wish else "", text, value=value)
-        if self._books is not None:
-            self._books.tell(event)
-        try:
-            self._tell(event)
-        except Exception:  # noqa: BLE001 - whoever listens must not take the session down
-            _log.exception("an event could not be told")
+        self._tell(DriveEvent(kind, str(wish) if wish else "", text, value=value))
 
     def _say_answer(self, answer: OnRoadAnswer) -> None:
         self._say("answer", answer.words, answer.wish, answer)

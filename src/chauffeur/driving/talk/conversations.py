@@ -10,7 +10,7 @@ from typing import Final
 from chauffeur.concept import Feedback, History, HistoryItem, Observation, Parameters, Plan, Policy, Program
 from chauffeur.concept.units import people_speed
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.judge.account import result_of_event, unused_of
+from chauffeur.driving.judge.account import unused_of
 from chauffeur.driving.live.messages import Report
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Interaction
@@ -135,11 +135,10 @@ class Conversations:
             case _:
                 shown = replace(shown, why=event.text)
         if event.final:
-            result = result_of_event(event.kind, shown.text, each.plan)
             unused = () if each.plan is None else unused_of(shown.text, each.plan)
             left_out = f"I did not use: {', '.join(f'“{part}”' for part in unused)}." if unused else ""
             why = " ".join(text for text in (event.text, left_out) if text)
-            shown = replace(shown, stage="closed", waits="", outcome=event.kind, result=str(result), why=why)
+            shown = replace(shown, stage="closed", waits="", outcome=event.kind, result=event.result or "", why=why)
         each.shown = replace(shown, stages=stages)
         if event.kind == "refused":
             self._hand_in(each)

@@ -14,17 +14,16 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Final, Self
 
-from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan
+from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan, Result
 from chauffeur.concept.units import kmh
-from chauffeur.driving.emergency import GOING_ON, STOPPING, brings_to_a_stand, question_to, stop_wanted
+from chauffeur.driving.drive_session import DriveSession, Entrance
+from chauffeur.driving.emergency import STOPPING, brings_to_a_stand, stop_wanted
 from chauffeur.driving.events import DriveEvent
-from chauffeur.driving.live.messages import Report
+from chauffeur.driving.live.messages import LiveEnd, Report
 from chauffeur.driving.live.mirror import live_world
-from chauffeur.driving.live.recorder import LiveRecorder
 from chauffeur.driving.live.settings import Settings, ring
 from chauffeur.driving.live.supervisor import Interaction, Runtime
-from chauffeur.driving.live.trip_memory import trip_of
-from chauffeur.driving.questions import NOTHING_ASKED
+from chauffeur.driving.recorder import DriveRecorder
 from chauffeur.driving.talk.asr_process import AsrEngine
 from chauffeur.driving.talk.attention import Attention
 from chauffeur.driving.talk.conversations import Conversations
@@ -55,10 +54,8 @@ from chauffeur.driving.talk.tally import Tally
 from chauffeur.driving.talk.view import View
 from chauffeur.driving.talk.voice import Voice
 from chauffeur.driving.talk.wish_queue import OVER, WishQueue, Words
-from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
-from chauffeur.language.meaning.reader import read
-from chauffeur.language.meaning.turns import answer_in, cancels, takes_back
-from chauffeur.language.questions import ends_session
+from chauffeur.driving.trips import live_trip
+from chauffeur.language.emergency import read_emergency
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
 
@@ -66,7 +63,6 @@ ASK_AFTER_S: Final = 15.0
 """So long a wish is driven, in the car's time, before the car asks how it is: many have no end of their own."""
 OPINION_WITHIN_S: Final = 2.0
 """An opinion that becomes a wish waits so long for its place in the memory, so that the planner finds it there."""
-LEAVING: Final = "You end the session. The car comes to a stand, and the drive is over."
 ABORTED_WITHIN_S: Final = 2.0
 """So long an end at once waits for the memory."""
 
@@ -95,7 +91,7 @@ class _Change:
     until_s: float
 
 
-class Talk:
+class Talk(DriveSession):
     """One session. Use as a context manager; afterwards the drive is over and what was to be kept is kept.
 
     Attributes:
@@ -103,13 +99,15 @@ class Talk:
         tally: What control did, for the end.
     """
 
+    leaving = "You end the session. The car comes to a stand, and the drive is over."
+
     def __init__(
         self,
         settings: Settings,
         tell: Callable[[Said], None],
         *,
         person: PersonId = NOBODY,
-        books: LiveRecorder | None = None,
+        books: DriveRecorder | None = None,
         engine: AsrEngine | None = None,
         sound: Sound | None = None,
         voice: Voice | None = None,
@@ -129,7 +127,8 @@ class Talk:
             most_s: After so long, in the car's time, the car stops.
             ask_after_s: So long a wish is driven before the car asks how it is.
         """
-        self._settings, self._tell, self._person, self._books = settings, tell, person, books
+        super().__init__(person, books)
+        self._settings, self._show = settings, tell
         self._voice = voice
         self._attention = Attention(engine, sound, voice, self._say, self._act_on)
         self._most_s, self._ask_after_s = most_s, ask_after_s
@@ -164,8 +163,6 @@ class Talk:
             runtime = Runtime(self._settings, self._heard)
             self._runtime = runtime
             self._view = View(self._settings, ring(runtime.folder, "observations"))
-            if self._books is not None:
-                self._books.follow(runtime, self._settings)
             self._introduce()
             runtime.__enter__()
         except BaseException:
@@ -177,6 +174,10 @@ class Talk:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._finish(broken=error is not None)
+
+    def close(self) -> None:
+        """End the drive, and keep what is to be kept."""
+        self._finish(broken=False)
 
     @property
     def driving(self) -> bool:
@@ -222,7 +223,7 @@ class Talk:
         self._guarded("The scene cannot be shown", self._look)
         if self._driven_s >= self._most_s and not self._stopping:
             self._say(Note("The time of this drive is over."))
-            self._stop()
+            self.stop()
 
     def take(self, told: Told | bytes) -> None:
         """What the person does, or sound of theirs (16 kHz, 16 bit, little-endian, mono)."""
@@ -241,7 +242,7 @@ class Talk:
             case bytes():
                 self._attention.take_sound(told)
             case Say():
-                self._typed(told.text)
+                self.ask(told.text)
             case Confirm():
                 self._attention.confirm(told.yes, Words("", ended_s=time.monotonic()))
             case Button():
@@ -249,14 +250,14 @@ class Talk:
             case Evaluate():
                 self._evaluate(told.text, told.wish, Words(told.text, ended_s=time.monotonic()))
             case TakeOver():
-                self._take_over(told.on)
+                self.take_over(told.on)
             case Hand():
                 if self._runtime is not None:
                     self._runtime.hand(told.key)
             case ShowSeat():
                 self._looking = told.on
             case Stop():
-                self._stop()
+                self.stop()
             case MemoryOrder():
                 if self._keeper is None:
                     self._say(Note("Nobody's memory is used. Begin with a name: chauffeur talk --as NAME.", True))
@@ -265,78 +266,69 @@ class Talk:
                     if told.do == "private" and self._books is not None:
                         self._say(Note("The audit log of this drive goes on, and holds your words.", trouble=True))
 
-    def _typed(self, text: str) -> None:
-        answer = answer_in(text) if self.question else None
-        if answer is not None:
-            self._attention.confirm(answer, Words("", ended_s=time.monotonic()))
+    def ask(self, text: str) -> None:
+        """Take typed words; what becomes of them is told."""
+        words = Words(text.strip(), ended_s=time.monotonic())
+        entrance = self.enter(words.text)
+        if entrance.way in ("yes", "no"):
+            self._attention.confirm(entrance.way == "yes", replace(words, text=""))
         else:
             self._attention.withdraw()
-            self._wish(Words(text.strip(), ended_s=time.monotonic()))
+            self._wish(words, entrance)
 
-    def _emergency(self, words: Words) -> bool:
-        """What has to be certain is done here, whoever has the wheel and whatever is planned; whether that was all."""
-        found = read_emergency(words.text)
-        if found is None or self._runtime is None or self._stopping:
-            return False
-        match found:
-            case Emergency(kind="stop"):
-                self._asking.pass_over(words.text, "stopped", STOPPING)
-                self._stop()
-            case Emergency(kind="safe_stop") if not self._shoulder():
-                self._asking.pass_over(words.text, "stopped", STOPPING)
-                self._say(Note("There is no shoulder here."))
-                self._stop()
-            case Emergency(kind="ask"):
-                self._asking.pass_over(words.text, "asked_back", question_to(found))
-                self._attention.offer(question_to(found), SAFE_STOP_WISH)
-            case Emergency(kind="no_stop", alone=True) if not self._is_stopping_by_plan():
-                self._asking.pass_over(words.text, "answered", GOING_ON)
-                self._say(Note(GOING_ON))
-                self._speak(GOING_ON)
+    def feedback(self, text: str) -> None:
+        """Keep an opinion on the last wish that was driven, which may wish for something else."""
+        self._evaluate(text, "", Words(text, ended_s=time.monotonic()))
+
+    def _wish(self, words: Words, entrance: Entrance | None = None) -> None:
+        entrance = self.enter(words.text) if entrance is None else entrance
+        stopping = self._stopping and entrance.way != "nothing"
+        match entrance.way:
+            case "opinion" | "wish" | "yes" | "no" if not stopping:
+                if self.taken_over:
+                    self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
+                elif entrance.way == "opinion" and not words.follows:
+                    self._evaluate(words.text, "", words)
+                else:
+                    self._asking.put(words)
+            case _ if stopping:
+                self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
+                self._asking.pass_over(words.text, "unasked", Result.NOT_DONE, OVER)
+            case "stop" | "leave":
+                self._asking.pass_over(words.text, "halt", entrance.result, entrance.words or STOPPING)
+                if entrance.words:
+                    self._say(Note(entrance.words))
+                self.stop()
+            case "distress":
+                self._asking.pass_over(words.text, "declined", entrance.result, entrance.words)
+                self._attention.offer(entrance.words, entrance.offer)
             case _:
-                return False
-        return True
+                self._asking.pass_over(words.text, "answered", entrance.result, entrance.words)
+                self._say(Note(entrance.words))
+                if entrance.way == "go_on":
+                    self._speak(entrance.words)
 
-    def _shoulder(self) -> bool:
-        """Whether a shoulder can be reached from here; where nothing is seen yet, the planner process finds out."""
-        report = None if self._runtime is None else self._runtime.report
-        now = None if report is None else self._instant(report.trip, report.tick)
-        return now is None or shoulder_at_right(now)
+    @property
+    def _question_is_open(self) -> bool:
+        return self.question
 
-    def _is_stopping_by_plan(self) -> bool:
-        """Whether the plan that is driven brings the car to a stand."""
-        runtime = self._runtime
-        driven = [] if runtime is None else [one for one in runtime.open_wishes if one.stage in ("planned", "driven")]
-        return any(one.brief is not None and brings_to_a_stand(one.brief.plan) for one in driven)
+    @property
+    def _was_driven(self) -> bool:
+        return bool(self._conversations.last_felt)
 
-    def _wish(self, words: Words) -> None:
-        if self._emergency(words):
-            return
-        if ends_session(words.text) and not self._stopping:
-            self._asking.pass_over(words.text, "answered", LEAVING)
-            self._say(Note(LEAVING))
-            self._stop()
-            return
-        if takes_back(words.text) and not self._may_be_taken_back(cancels(words.text)):
-            self._asking.pass_over(words.text, "answered", NOTHING_ASKED)
-            self._say(Note(NOTHING_ASKED))
-            return
-        if self._stopping:
-            self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
-            self._asking.pass_over(words.text, "not_asked", OVER)
-            return
-        if self._runtime is not None and self._runtime.taken_over:
-            self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
-            return
-        if not words.follows and self._conversations.last_felt and read(words.text).address == "feedback":
-            self._evaluate(words.text, "", words)
-            return
-        self._asking.put(words)
-
-    def _may_be_taken_back(self, cancelled: bool) -> bool:
-        """Whether a wish has no plan yet, which a newer one takes back; one that is `cancelled` may have one."""
+    def _takes_back(self, cancelled: bool) -> bool:
         wishes = () if self._runtime is None else self._runtime.open_wishes
         return self.busy or any(cancelled or one.stage == "asked" for one in wishes)
+
+    def _reaches_shoulder(self) -> bool:
+        report = None if self._runtime is None else self._runtime.report
+        now = None if report is None else self._instant(report.trip, report.tick)
+        return now is None or shoulder_at_right(now)  # where nothing is seen yet, the planner process finds out
+
+    def _stops_by_plan(self) -> bool:
+        wishes = () if self._runtime is None else self._runtime.open_wishes
+        driven = (one.brief for one in wishes if one.stage in ("planned", "driven"))
+        return any(brief is not None and brings_to_a_stand(brief.plan) for brief in driven)
 
     def _act_on(self, hotword: str, words: Words) -> None:
         """What was heard and is meant."""
@@ -345,7 +337,8 @@ class Talk:
         else:
             self._wish(words)
 
-    def _take_over(self, on: bool) -> None:
+    def take_over(self, on: bool) -> None:
+        """The person takes the wheel, or gives it back; `Hand` moves the car meanwhile."""
         runtime = self._runtime
         if runtime is None or runtime.taken_over == on:
             return
@@ -356,7 +349,8 @@ class Talk:
             else Note("The car has the wheel again. It keeps speed and lane until you wish for something.")
         )
 
-    def _stop(self) -> None:
+    def stop(self) -> None:
+        """Bring the car to a stand, and end the drive."""
         if self._runtime is None or self._stopping:
             return
         self._stopping = True
@@ -370,7 +364,10 @@ class Talk:
     def _evaluate(self, text: str, wish: str, words: Words) -> None:
         said = " ".join(text.split())
         wish = wish or self._conversations.last_felt
-        if not said or (stop_wanted(read_emergency(said)) and self._emergency(replace(words, text=said))):
+        if not said:
+            return
+        if stop_wanted(read_emergency(said)):
+            self._wish(replace(words, text=said))
             return
         if wish not in self._conversations:
             self._say(Note("Nothing was driven yet that there could be an opinion on."))
@@ -442,14 +439,13 @@ class Talk:
             return
         trip = max(1, interaction.answer.trip or (0 if runtime.report is None else runtime.report.trip))
         start = self._settings.starts[min(trip, len(self._settings.starts)) - 1]
-        keeper.trip(interaction.request.wish, trip_of(interaction, start, self._dt_s, runtime.report))
+        keeper.trip(interaction.request.wish, live_trip(interaction, start, self._dt_s, runtime.report))
 
     # The drive --------------------------------------------------------------------------------------------------------
 
     def _heard(self, event: DriveEvent) -> None:
         """What the runtime tells."""
-        if self._books is not None:
-            self._books.tell(event)
+        self._tell(event)
         match event.value:
             case History() as history:
                 self._conversations.recalled(event.wish, history)
@@ -467,7 +463,7 @@ class Talk:
     def _became(self, event: DriveEvent) -> None:
         """What became of a wish."""
         if event.kind == "halt":
-            self._stop()
+            self.stop()
             return
         runtime = self._runtime
         interaction = None if runtime is None else runtime.interactions.get(event.wish)
@@ -556,8 +552,8 @@ class Talk:
         for text in (*self._asking.give_up(runtime), *(change.words.text for change in self._changes)):
             self._say(Note(f"Not asked: “{text}”. {OVER}"))
         self.tally.end(runtime, died=self.outcome == "died")
-        if self._books is not None:
-            self._books.end(self.outcome, self.tally.figures, runtime.lost_reports)
+        end = LiveEnd(self.outcome, self.tally.figures or {}, runtime.lost_reports)
+        self._tell(DriveEvent("over", value=end))
         if self._keeper is not None:
             for news in self._keeper.close(ABORTED_WITHIN_S if self.outcome == "aborted" else CLOSE_WITHIN_S):
                 self._kept(news)
@@ -577,7 +573,7 @@ class Talk:
         if said.kind in ("session", "road", "scene", "listening", "memory", "ended"):
             self._newest[said.kind] = said
         try:
-            self._tell(said)
+            self._show(said)
         except Exception:  # noqa: BLE001 - a screen that fails must not take the drive with it
             _log.exception("a screen failed")
 

@@ -6,9 +6,10 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Instruction, InstructionError, PersonId
-from chauffeur.driving.live.recorder import LiveRecorder
+from chauffeur.concept import Instruction, InstructionError, PersonId, Result
+from chauffeur.driving.events import DriveEvent, WishEventKind
 from chauffeur.driving.live.supervisor import Runtime
+from chauffeur.driving.recorder import DriveRecorder
 from chauffeur.driving.session import MAX_WISH_CHARACTERS, parse_wish
 
 OVER: Final = "The drive was over before it came to this."
@@ -40,7 +41,7 @@ class Words:
 class WishQueue:
     """Hands wishes on in their order. Used from the thread that polls the drive."""
 
-    def __init__(self, person: PersonId, books: LiveRecorder | None = None) -> None:
+    def __init__(self, person: PersonId, books: DriveRecorder | None = None) -> None:
         """Args: whose wishes they are; where they are written down, None for nowhere."""
         self._person, self._books = person, books
         self._waiting: list[tuple[Words, Instruction]] = []
@@ -60,7 +61,7 @@ class WishQueue:
         try:
             instruction = parse_wish(words.text, self._person)
         except InstructionError as error:
-            self.pass_over(words.text, "refused", str(error))
+            self.pass_over(words.text, "refused", Result.DECLINED, str(error))
             raise
         source = "speech" if words.spoken else "text"
         instruction = replace(instruction, source=source, confirmed=words.confirmed)
@@ -79,7 +80,7 @@ class WishQueue:
         words, instruction = self._waiting.pop(0)
         if self._books is None:
             return (self._hand_on(runtime, instruction), words), ""
-        self._books.wish(runtime.next_wish, instruction)
+        self._books.tell(DriveEvent("wish", runtime.next_wish, instruction.text, value=instruction))
         self._keeping = words, instruction, self._books.kept()
         return None, ""
 
@@ -88,19 +89,23 @@ class WishQueue:
         unasked: list[str] = []
         if self._keeping is not None:
             unasked.append(self._keeping[1].text)
-            if self._books is not None:
-                self._books.answer(runtime.next_wish, "not_asked", OVER)
+            self._answer(runtime.next_wish, "unasked", Result.NOT_DONE, OVER)
         for words, _ in self._waiting:
             unasked.append(words.text)
-            self.pass_over(words.text, "not_asked", OVER)
+            self.pass_over(words.text, "unasked", Result.NOT_DONE, OVER)
         self._keeping, self._waiting = None, []
         return tuple(unasked)
 
-    def pass_over(self, text: str, kind: str, why: str) -> None:
+    def pass_over(self, text: str, kind: WishEventKind, result: Result, why: str) -> None:
         """A wish that is not handed on stands in the books all the same."""
         if self._books is not None:
-            self._books.wish("", Instruction(text[:MAX_WISH_CHARACTERS], self._person))
-            self._books.answer("", kind, why)
+            said = Instruction(text[:MAX_WISH_CHARACTERS], self._person)
+            self._books.tell(DriveEvent("wish", text=said.text, value=said))
+        self._answer("", kind, result, why)
+
+    def _answer(self, wish: str, kind: WishEventKind, result: Result, why: str) -> None:
+        if self._books is not None:
+            self._books.tell(DriveEvent(kind, wish, why, final=True, result=result))
 
     def _hand_on(self, runtime: Runtime, instruction: Instruction) -> str:
         return runtime.ask(instruction.text, instruction.person, confirmed=instruction.confirmed)

@@ -13,8 +13,8 @@ from typing import Any, Final
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee
 from chauffeur.concept import Observation, Outcome, Scenario
 from chauffeur.concept.nouns import Metric
+from chauffeur.driving.episode import drive_program
 from chauffeur.driving.judge.goals import make_goal
-from chauffeur.driving.session import drive_program
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.link import Linked
 from chauffeur.programs import Sandbox

@@ -38,8 +38,9 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.data import read_data
 from chauffeur.describe.dispatch import describe
+from chauffeur.driving.episode import drive_policy, make_world, trip_s
 from chauffeur.driving.planning import checked, screened_request
-from chauffeur.driving.session import drive_policy, make_world, scenario_hash, trip_s
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.geometry import Pose, wrap_to_pi
 from chauffeur.models.vilad.driving_recipe import drive_cases
 from chauffeur.models.vilad.parking_words import wish

@@ -27,7 +27,7 @@ from chauffeur.camera import (
 )
 from chauffeur.concept import DataError, Lead, Observation, Scenario, VehicleState
 from chauffeur.concept.weather import WEATHERS
-from chauffeur.driving.session import make_world
+from chauffeur.driving.episode import make_world
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.planners.camera_faults import CELLS, HEIGHT, WIDTH, small
 from chauffeur.worlds.base import World

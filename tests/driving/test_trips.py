@@ -26,8 +26,8 @@ from chauffeur.driving.live.messages import Report
 from chauffeur.driving.live.plan_messages import TOOK_OVER, PlanningInputs, Request
 from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Interaction
-from chauffeur.driving.live.trip_memory import trip_of
 from chauffeur.driving.scenarios import find
+from chauffeur.driving.trips import live_trip
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.worlds.highway import HighwayWorld
 
@@ -74,7 +74,7 @@ def closed(brief: PlanningInputs | None, kind: EventKind, *, begun: int | None, 
 def test_how_a_wish_ended_is_how_its_trip_ended(
     brief: PlanningInputs, kind: EventKind, begun: int | None, last: str, outcome: Outcome, driven_s: float
 ) -> None:
-    trip = trip_of(closed(brief, kind, begun=begun, at=60, text="Why."), START, DT_S, report(60, last))
+    trip = live_trip(closed(brief, kind, begun=begun, at=60, text="Why."), START, DT_S, report(60, last))
     assert trip is not None
     assert (trip.outcome, trip.duration_s) == (outcome, pytest.approx(driven_s))
     assert (trip.instruction, trip.context, trip.plan) == (brief.instruction, brief.context, PLAN)
@@ -90,7 +90,7 @@ def test_parameters_are_remembered_and_recalled_with_what_was_said_of_them(
     brief: PlanningInputs, tmp_path: Path
 ) -> None:
     plan = Plan(Thoughts("I park."), Parameters(3.0, 5.0, 1.0, route="B4"), planner="talk2drive", intent="park")
-    trip = trip_of(closed(replace(brief, plan=plan), "finished", begun=10, at=60), START, DT_S, report(60))
+    trip = live_trip(closed(replace(brief, plan=plan), "finished", begun=10, at=60), START, DT_S, report(60))
     assert trip is not None
     assert trip.plan == plan
     memory = VaultMemory(tmp_path)
@@ -102,31 +102,31 @@ def test_parameters_are_remembered_and_recalled_with_what_was_said_of_them(
 
 
 def test_that_the_person_took_over_is_kept_with_the_trip(brief: PlanningInputs) -> None:
-    trip = trip_of(closed(brief, "interrupted", begun=10, at=60, text=TOOK_OVER), START, DT_S, report(60))
+    trip = live_trip(closed(brief, "interrupted", begun=10, at=60, text=TOOK_OVER), START, DT_S, report(60))
     assert trip is not None
     assert (trip.outcome, dict(trip.record)["taken_over"]) == ("ended", True)
 
 
 @pytest.mark.parametrize("kind", ["finished", "superseded", "interrupted", "failed"])
 def test_what_was_never_begun_is_no_trip(brief: PlanningInputs, kind: EventKind) -> None:
-    assert trip_of(closed(brief, kind, begun=None, at=60), START, DT_S, report(60)) is None
+    assert live_trip(closed(brief, kind, begun=None, at=60), START, DT_S, report(60)) is None
 
 
 @pytest.mark.parametrize("kind", ["stale", "unplanned"])
 def test_what_never_had_a_plan_to_drive_is_no_trip(brief: PlanningInputs, kind: EventKind) -> None:
-    assert trip_of(closed(brief, kind, begun=None, at=60), START, DT_S, report(60)) is None
-    assert trip_of(closed(None, "declined", begun=None, at=60), START, DT_S, report(60)) is None
+    assert live_trip(closed(brief, kind, begun=None, at=60), START, DT_S, report(60)) is None
+    assert live_trip(closed(None, "declined", begun=None, at=60), START, DT_S, report(60)) is None
 
 
 def test_an_end_that_the_supervisor_alone_could_tell_is_timed_by_control(brief: PlanningInputs) -> None:
-    trip = trip_of(closed(brief, "interrupted", begun=10, at=0), START, DT_S, report(110))
+    trip = live_trip(closed(brief, "interrupted", begun=10, at=0), START, DT_S, report(110))
     assert trip is not None
     assert trip.duration_s == pytest.approx(10.0)
 
 
 def test_the_same_wish_said_later_is_another_trip(brief: PlanningInputs) -> None:
-    one = trip_of(closed(brief, "finished", begun=10, at=60), START, DT_S, None)
-    other = trip_of(closed(replace(brief, tick=8), "finished", begun=10, at=60), START, DT_S, None)
+    one = live_trip(closed(brief, "finished", begun=10, at=60), START, DT_S, None)
+    other = live_trip(closed(replace(brief, tick=8), "finished", begun=10, at=60), START, DT_S, None)
     assert one is not None
     assert other is not None
     assert one.id != other.id
