@@ -371,7 +371,7 @@ export function makeDrawer(canvas) {
     drawWishes(scene);
     drawLights(scene.lights);
     if (words) {
-      plates.push(boxOf(ego));
+      for (const body of [ego, ...bodies.filter((one) => one.meant)]) plates.push(boxOf(body));
       onScreen();
       for (const name of road.names) drawName(name);
       inWorld();
