@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from cabin_desk import SAID, SAID_MPS, Desk
 from cabin_drive import Drive, driving
-from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
 from chauffeur.driving.talk.messages import (
     Button,
@@ -30,6 +29,7 @@ from chauffeur.driving.talk.messages import (
     TakeOver,
 )
 from chauffeur.hmi.cabin import Cabin
+from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.server]
 
