@@ -1,8 +1,8 @@
 """Drawings from above that stand still: shapes in metres, bottom to top, as SVG or as pixels.
 
-Reports, filmstrips and town maps say what is to be drawn; how it looks stands in `LOOKS`, which a page's style sheet
-may replace. The frame is that of pictures, y downwards. Numbers go in as numbers and words are escaped, so nothing a
-person or a model wrote is ever markup.
+Filmstrips, town maps and maps of routes say what is to be drawn; how it looks stands in `LOOKS`. The frame is that of
+pictures, y downwards. Numbers go in as numbers and words are escaped, so nothing a person or a model wrote is ever
+markup.
 """
 
 from __future__ import annotations
@@ -28,15 +28,7 @@ LOOKS: Final[dict[str, str]] = {
     "crashed": "#d6281e", "ring": "#cbb9ff",
 }  # fmt: skip
 """Colours by day; amber is the ego and nothing else."""
-SYMBOLS: Final = (
-    '<svg class="symbols" width="0" height="0" aria-hidden="true"><defs>'
-    '<g id="car"><rect class="body" x="-2.5" y="-1" width="5" height="2" rx=".5"/>'
-    '<path class="glass" d="M.4-.75 1.3-.68V.68L.4.75zM-1.8-.66l.5.04V.62l-.5.04z"/></g>'
-    "</defs></svg>"
-)
-"""What every drawing with bodies refers to; once a page."""
 _CAR_M: Final = (5.0, 2.0)
-"""Size of the body drawn once and used for every car; others are scaled."""
 _DASH_M: Final = (3.0, 6.0)
 _LINE_M: Final = 0.2
 _SIGN_M: Final = 1.6
@@ -128,7 +120,7 @@ def scene_shapes(so_far: Sequence[Observation], seen: Bounds) -> Iterator[DrawnS
 def _body(body: VehicleState, look: str) -> DrawnShape:
     return DrawnShape(
         "car",
-        f"{look} crashed".removeprefix("other ") if body.crashed else look,
+        "crashed" if body.crashed else look,
         ((body.x_m, body.y_m),),
         heading_rad=body.heading_rad,
         size=(body.length_m, body.width_m),
@@ -144,7 +136,7 @@ def _paint(body: VehicleState) -> str:
 
 
 def svg_of(shapes: Iterable[DrawnShape]) -> str:
-    """Elements whose class is their look; they need `SYMBOLS` on their page for cars, and the colours of `LOOKS`."""
+    """Elements whose class is their kind and their look; `style_of_looks` colours them."""
     return "".join(_element(shape) for shape in shapes)
 
 
@@ -152,7 +144,8 @@ def style_of_looks() -> str:
     """A style sheet for a drawing that stands alone."""
     rules = "".join(f".r-{name}{{color:{colour}}}" for name, colour in LOOKS.items())
     return (
-        "<style>.r-line{fill:none;stroke:currentColor;stroke-linejoin:round}.r-area,.r-dot,.r-text{fill:currentColor}"
+        "<style>.r-line{fill:none;stroke:currentColor;stroke-linejoin:round}"
+        ".r-area,.r-dot,.r-text,.r-car{fill:currentColor}"
         f".r-text{{font:500 1px sans-serif}}{rules}"
         f".r-place{{stroke:{LOOKS['ground']};stroke-width:.4px;paint-order:stroke}}</style>"
     )
@@ -180,18 +173,11 @@ def _element(shape: DrawnShape) -> str:
                 f"{html.escape(shape.text)}</text>"
             )
         case "car":
-            return _car(shape, x, y)
-
-
-def _car(shape: DrawnShape, x: float, y: float) -> str:
-    turn = math.degrees(shape.heading_rad) % 360.0
-    place = f"translate({x:.1f} {y:.1f})"
-    if round(turn, 1) not in (0.0, 360.0):
-        place += f" rotate({turn:.1f})"
-    if shape.size != _CAR_M:
-        place += f" scale({shape.size[0] / _CAR_M[0]:.3g} {shape.size[1] / _CAR_M[1]:.3g})"
-    look = f'class="painted" fill="{shape.paint}"' if shape.paint else f'class="{shape.look}"'
-    return f'<use {look} href="#car" transform="{place}"/>'
+            (long, wide), turn = shape.size, math.degrees(shape.heading_rad)
+            return (
+                f'<rect {look} x="{-long / 2.0:.2f}" y="{-wide / 2.0:.2f}" width="{long:.2f}" height="{wide:.2f}" '
+                f'rx="0.5" transform="translate({x:.1f} {y:.1f}) rotate({turn:.1f})"/>'
+            )
 
 
 # As pixels ------------------------------------------------------------------------------------------------------------
@@ -229,7 +215,7 @@ class Canvas:
         )
 
     def _paint(self, shape: DrawnShape) -> None:
-        colour = shape.paint or LOOKS[shape.look.rpartition(" ")[2]]
+        colour = shape.paint or LOOKS[shape.look]
         x, y = self._at(shape.points[0])
         match shape.kind:
             case "line":
@@ -248,8 +234,8 @@ class Canvas:
                 self._body(shape, colour)
 
     def _body(self, shape: DrawnShape, colour: str) -> None:
-        (length, width), edge = shape.size, LOOKS["ego-edge" if shape.look.startswith("ego") else "car-edge"]
-        if shape.look.startswith("ego"):
+        (length, width), edge = shape.size, LOOKS["ego-edge" if shape.look == "ego" else "car-edge"]
+        if shape.look == "ego":
             self._draw.polygon(
                 self._corners(shape.points[0], shape.heading_rad, 1.24 * length, 1.56 * width), "#ffe2a6"
             )
