@@ -96,7 +96,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
         panels.setdefault(command.rich_help_panel, []).append(name)
     assert {heading: sorted(names) for heading, names in panels.items()} == {
         "Drive": ["drive", "feedback", "me", "talk"],
-        "Look": ["doctor", "plugins", "replay", "report", "show", "what-if"],
+        "Look": ["doctor", "plugins", "replay", "report", "show", "view", "what-if"],
         "Measure": ["bench"],
         "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
