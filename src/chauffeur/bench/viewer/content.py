@@ -201,7 +201,7 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
     names = list(dict.fromkeys(name for row in run.rows for name in row if name not in _CONSTANT))
     shown: list[Json] = []
     for row in run.rows:
-        wrong = None if spec is None or not spec.rows(row) else missed(spec.measures, row)
+        wrong = None if spec is None else _wrong(spec, row)
         reply = _reply(answers.get(str(row["item"]), {}), row)
         shown.append(
             {
@@ -229,6 +229,14 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
         "columns": names,
         "rows": shown,
     }
+
+
+def _wrong(spec: TableSpec, row: AnyRow) -> bool | None:
+    """True if a row is not as it should be; None where that cannot be said, also of rows of an earlier version."""
+    try:
+        return missed(spec.measures, row) if spec.rows(row) else None
+    except (LookupError, TypeError, ValueError):
+        return None
 
 
 def _judged_words(wrong: bool | None) -> str:
