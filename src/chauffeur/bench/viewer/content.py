@@ -202,11 +202,12 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
     shown: list[Json] = []
     for row in run.rows:
         wrong = None if spec is None else _wrong(spec, row)
-        reply = _reply(answers.get(str(row["item"]), {}), row)
+        answer = answers.get(str(row["item"]), {})
+        reply = _reply(answer, row)
         shown.append(
             {
                 "item": str(row["item"]),
-                "words": _cut(asked_words(row)),
+                "words": _cut(_asked(row, answer)),
                 "ending": ending_words(row, _judged_words(wrong)),
                 "wrong": wrong,
                 "group": str(row.get(group, "")).replace("_", " "),
@@ -241,6 +242,14 @@ def _wrong(spec: TableSpec, row: AnyRow) -> bool | None:
 
 def _judged_words(wrong: bool | None) -> str:
     return "" if wrong is None else "not as it should be" if wrong else "as it should be"
+
+
+def _asked(row: AnyRow, answer: Mapping[str, Any]) -> str:
+    """What a row's item asked with; where the row does not tell, what the model was asked first."""
+    words = asked_words(row)
+    if words != str(row["item"]):
+        return words
+    return next((str(turn["text"]) for turn in answer.get("turns") or () if turn.get("role") == "user"), words)
 
 
 def _causes(row: AnyRow) -> list[str]:
@@ -280,7 +289,7 @@ def sample_json(run: Run, row: AnyRow, card: Card, answer: Mapping[str, Any], sy
     listed = {"thoughts", "program", *_CONSTANT}
     return {
         "item": card.item,
-        "words": card.words,
+        "words": _cut(_asked(row, answer)),
         "ending": card.ending,
         "goal": card.goal,
         "why": list(card.why),

@@ -198,14 +198,15 @@ def judge_of(run: Run, kind: Any) -> str:
 
 def headline(run: Run, kind: Any) -> Json | None:
     """The figure that stands for a run: of the first table that has one the last with a better direction, over all
-    rows."""
+    rows; the first table's last where none has."""
     specs = specs_of(kind)
-    for spec in specs:
-        measures = [one for one in spec.measures if one.better and one.whole is None]
-        rows = spec.about(run.rows) if measures else ()
-        if rows:
-            found = replace(measures[-1], varies=False).aggregate(rows)
-            return _figure(spec.title, measures[-1], found.value)
+    for judged in (True, False):
+        for spec in specs:
+            measures = [one for one in spec.measures if one.whole is None and (one.better or not judged)]
+            rows = spec.about(run.rows) if measures else ()
+            if rows:
+                found = replace(measures[-1], varies=False).aggregate(rows)
+                return _figure(spec.title, measures[-1], found.value)
     tables: Sequence[Mapping[str, Any]] = run.stored.get("tables") or ()
     if specs or not tables or not tables[0].get("lines"):
         return None
