@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_folders import outcome, read_lines, write, write_lines, write_run
 
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.bench.report.build import Choices, build_report
@@ -15,6 +14,7 @@ from chauffeur.bench.report.model import Card
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Scenario
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.worlds.highway.scenarios import BUILT_IN
+from report_folders import outcome, read_lines, write, write_lines, write_run
 
 STAY = """def stay():
     while True:
