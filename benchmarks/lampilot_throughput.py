@@ -115,19 +115,17 @@ def make_data(folder: Path, requests: int) -> None:
 
 def measure(data: Path, folder: Path, requests: int, latency_s: float, allowed: int, concurrency: int) -> str:
     from chauffeur.bench.kernel.pipeline import TELL_S
-    from chauffeur.bench.kernel.run import Effort
-    from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
+    from chauffeur.bench.kernel.run import BenchRun, Effort
+    from chauffeur.bench.lampilot import lampilot
     from chauffeur.planners.registry import make_planner
-    from chauffeur.worlds.highway.dblv1 import load_dataset
 
     command = [sys.executable, __file__, "--serve", "--latency", str(latency_s), "--allowed", str(allowed)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert server.stdout is not None
         url = f"http://127.0.0.1:{int(server.stdout.readline())}/v1"
-        dataset = load_dataset(data)
         planner = make_planner("openai/m", base_url=url, attempts=1, stream=False, cache=False)
-        run = LampilotRun(folder, dataset, RunConfig("openai/m", "few-shot", dataset.sha256, requests, 1), planner)
+        run = BenchRun(folder, lampilot(data, "openai/m", items=requests, seed=1), planner)
         before = resource.getrusage(resource.RUSAGE_SELF)
         started_s = time.monotonic()
         told: list[float] = []

@@ -9,9 +9,12 @@ from typing import Any
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.progress import Standing
-from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
+from chauffeur.bench.kernel.stages import made_by
+from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
+from chauffeur.bench.lampilot.requests import PlainRequests, Requests
+from chauffeur.concept import LAMPILOT_LIMITS
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -81,15 +84,20 @@ def quiet(standing: Standing) -> None:
     """Watches without a word."""
 
 
+def benchmark(dataset: Dataset, spec: str, requests: Requests | None = None, **options: Any) -> LampilotBenchmark:
+    """The benchmark under the three-shot prompt, if no other requests are given."""
+    return LampilotBenchmark(dataset, requests or PlainRequests.of("few-shot", LAMPILOT_LIMITS), spec, **options)
+
+
 def make_run(
-    folder: Path, dataset: Dataset, spec: str, *, items: int = 0, shard: Shard = WHOLE, planner: Any = None
-) -> LampilotRun:
-    config = RunConfig(spec, "few-shot", dataset.sha256, items, 42)
+    folder: Path, dataset: Dataset, spec: str, *, shard: Shard = WHOLE, planner: Any = None, **options: Any
+) -> BenchRun:
     maker = None if spec in ("idm", "mobil") else planner or make_planner(spec)
-    return LampilotRun(folder, dataset, config, maker, shard=shard)
+    made = made_by("lampilot", {"data": dataset.path, "planner": spec, **options})
+    return BenchRun(folder, benchmark(dataset, spec, **options), maker, shard=shard, made=made)
 
 
-def finish(run: LampilotRun, **effort: Any) -> bytes:
+def finish(run: BenchRun, **effort: Any) -> bytes:
     """Run to the end, in this process if nothing else is said; the results as they were written."""
     run.run(quiet, Effort(**{"workers": 1, "patience": FAST, "engine": Inline, **effort}))
     return outcome(run.folder)

@@ -113,7 +113,7 @@ async def _drive(
 
 def run_benchmark(
     name: str,
-    planner: str | Planner | Answerer = "onboard",
+    planner: str | Planner | Answerer | None = None,
     *,
     out: Path | str,
     workers: int = 0,
@@ -129,7 +129,8 @@ def run_benchmark(
 
     Args:
         name: As `chauffeur bench` knows it.
-        planner: Who is asked: a planner for plans, a model for questions, or a specification of either.
+        planner: Who is asked: a planner for plans, a model for questions, or a specification of either. By default the
+            benchmark's own choice, which is `onboard` for most.
         out: The run's folder: results, table, provenance.
         workers: Worker processes; 0 for one a core.
         options: The benchmark's own, as `--option` of its command takes them.

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from coached_data import DESCRIPTION, GO_LEFT, IDLE, USE_IT, make_data, reply, server_module
 
-from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.store import RowStore
+from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
 from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, PersonCritic
 from chauffeur.bench.lampilot.description import usable_description
 from chauffeur.bench.lampilot.policy_aid import PolicyAid, aid_for
-from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
 from chauffeur.driving.again import drive_again
@@ -115,7 +115,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     items = items_named(dataset, ["left_lc_s0_c0", "left_lc_s1_c1"])
     coach.coach(items[:1])
     aid = PolicyAid(coach.repository.folder, LAMPILOT_LIMITS)
-    assert aid.setting == "human-feedback" and aid.programs == 1 and coach.repository.digest in aid.id
+    assert aid.programs == 1 and coach.repository.digest in aid.id
     told = "1 programs, learned on 1 items, which are not held out where they are scored"
     assert aid.labels == (f"policy repository {aid.digest[:12]}: {told}", "critic: evaluator (not a person)")
     assert aid.coached_items == {"left_lc_s0_c0"}
@@ -166,8 +166,8 @@ def test_a_benchmark_run_asks_with_the_frozen_repository(
     coach = make_coach()
     coach.coach(items_named(dataset, ["left_lc_s0_c0"]))
     aid = aid_for("human-feedback", coach.repository.folder, LAMPILOT_LIMITS)
-    config = RunConfig("openai/m", "zero-shot", dataset.sha256, 0, 42)
-    run = LampilotRun(tmp_path / "bench", dataset, config, coach.planner, requests=aid)
+    assert aid is not None
+    run = BenchRun(tmp_path / "bench", LampilotBenchmark(dataset, aid, setting="human-feedback"), coach.planner)
     rows = {row["item"]: row for row in run.run(lambda *standing: None, Effort(workers=1, concurrency=2))}
     assert [rows[f"left_lc_s{i}_c{j}"]["success"] for i in (0, 1) for j in (0, 1)] == [True] * 4
     assert rows["left_lc_s0_c0"]["rollout_key"] == rows["left_lc_s0_c1"]["rollout_key"]

@@ -156,6 +156,15 @@ def test_what_is_mistyped_is_named(tmp_path: Path, profile: Any, options: Any, w
         Evaluation(Evaluated.of(Left()), tmp_path, profile, options)
 
 
+def test_what_is_left_out_now_stays_on_the_card(card: Path, data: Path, tmp_path: Path) -> None:
+    before = read_card(card).ran
+    other = Evaluation(Evaluated.of(Left()), card, "quick", {}, ["faithfulness"]).run(no_watch, IN_THIS_PROCESS)
+    assert other.ran == before
+    asked_for = Evaluation(Evaluated.of(Left()), card, "quick", {"lampilot": {"data": str(tmp_path)}}, ["lampilot"])
+    (entry,) = [one for one in asked_for.card.entries if one.name == "lampilot"]
+    assert (entry.state, bool(entry.why), entry.figures) == ("not run", True, ()), "another run has not been made"
+
+
 def test_an_interrupt_keeps_what_is_finished(tmp_path: Path, data: Path) -> None:
     def stop(*_: Any) -> None:
         raise KeyboardInterrupt

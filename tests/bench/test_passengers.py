@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
 from chauffeur.bench.lampilot.requests import PlainRequests
-from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee, feasible, impossible, start_of
 from chauffeur.bench.passengers import PassengerRequests, PassengerWish, as_dataset, load_wishes
 from chauffeur.bench.passengers.loader import STEMS, parse_wishes
@@ -181,9 +181,8 @@ def test_a_run_drives_them(tmp_path: Path) -> None:
     data = as_dataset()
     some = [data.tasks[i] for i in (0, 172, len(WISHES) - 1)]
     data = replace(data, tasks=tuple(some))
-    config = RunConfig("keyword", "zero-shot", data.sha256, 0, 0, asked="passengers-v1")
     requests = PassengerRequests(PlainRequests.of("zero-shot", LAMPILOT_LIMITS), WISHES)
-    run = LampilotRun(tmp_path / "run", data, config, make_planner("keyword"), requests=requests)
+    run = BenchRun(tmp_path / "run", LampilotBenchmark(data, requests, "keyword"), make_planner("keyword"))
     rows = run.run(quiet, Effort(workers=1, engine=Inline))
     assert [row["task"] for row in rows] == [task.name for task in some]
     assert all("answered_rightly" in row for row in rows)

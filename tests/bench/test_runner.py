@@ -10,10 +10,9 @@ import pytest
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.report import tables
-from chauffeur.bench.kernel.run import Effort
-from chauffeur.bench.lampilot.frozen import choose_items
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.lampilot.benchmark import choose_items
 from chauffeur.bench.lampilot.report import COMPLETION, FAMILY_TABLE, SCORE_TABLE
-from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.concept import (
     ConfigError,
     Context,
@@ -29,7 +28,7 @@ from chauffeur.concept import (
 )
 from chauffeur.worlds.highway.dblv1 import Dataset, Item, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
-from small_run import Inline
+from small_run import Inline, benchmark
 
 LEFT = """
 def change():
@@ -86,8 +85,7 @@ EFFORT = Effort(engine=Inline, patience=Patience(attempts=2, base_s=0.01))
 
 
 def _run(tmp_path: Path, dataset: Dataset, planner: ScriptedPlanner) -> list[dict[str, object]]:
-    config = RunConfig("scripted", "few-shot", dataset.sha256, 0, 42)
-    return LampilotRun(tmp_path / "run", dataset, config, planner).run(_quiet, EFFORT)
+    return BenchRun(tmp_path / "run", benchmark(dataset, "scripted"), planner).run(_quiet, EFFORT)
 
 
 @pytest.mark.slow
@@ -118,17 +116,20 @@ def test_outcomes_and_causes_are_apart_and_the_denominator_is_fixed(tmp_path: Pa
 
 
 def test_a_run_folder_keeps_its_configuration(tmp_path: Path, dataset: Dataset) -> None:
-    LampilotRun(tmp_path / "run", dataset, RunConfig("idm", "few-shot", dataset.sha256, 0, 42), None)
+    BenchRun(tmp_path / "run", benchmark(dataset, "idm"))
     with pytest.raises(ConfigError, match="another configuration"):
-        LampilotRun(tmp_path / "run", dataset, RunConfig("mobil", "few-shot", dataset.sha256, 0, 42), None)
-    with pytest.raises(ConfigError, match="no baseline"):
-        LampilotRun(tmp_path / "other", dataset, RunConfig("magic", "few-shot", dataset.sha256, 0, 42), None)
+        BenchRun(tmp_path / "run", benchmark(dataset, "mobil"))
+    with pytest.raises(ConfigError, match="asks for plans"):
+        BenchRun(tmp_path / "other", benchmark(dataset, "magic"))
 
 
 @pytest.mark.slow
 def test_labels_stand_in_every_row_and_the_request_can_be_replaced(tmp_path: Path, dataset: Dataset) -> None:
     class Coached:
         """What a learning loop asks instead of the plain wish."""
+
+        id = "coached"
+        labels: tuple[str, ...] = ()
 
         async def request(self, item: Item, context: Context) -> PlanRequest:
             rounds = (Round("def before(): ...", "Too slow."),)
@@ -141,15 +142,15 @@ def test_labels_stand_in_every_row_and_the_request_can_be_replaced(tmp_path: Pat
             assert request.rounds[0].feedback == "Too slow."
             return await super().plan(request)
 
-    config = RunConfig("scripted", "few-shot", dataset.sha256, 0, 42)
-    run = LampilotRun(tmp_path / "run", dataset, config, Labelled(), requests=Coached())
+    coached = benchmark(dataset, "scripted", Coached())
+    run = BenchRun(tmp_path / "run", coached, Labelled())
     rows = run.run(_quiet, EFFORT)
     assert {tuple(row["labels"]) for row in rows} == {("critic: evaluator",)}
     assert sum(row["success"] for row in rows) == 5, "every command became the same wish; one sample is broken"
     assert "critic: evaluator" in (run.folder / "table.md").read_text()
     assert json.loads((run.folder / "provenance.json").read_text())["labels"] == ["critic: evaluator"]
     with pytest.raises(ConfigError, match="another configuration"):
-        LampilotRun(tmp_path / "run", dataset, config, ScriptedPlanner())
+        BenchRun(tmp_path / "run", coached, ScriptedPlanner())
 
 
 def test_items_are_drawn_as_the_origin_draws_them(dataset: Dataset) -> None:

@@ -282,12 +282,11 @@ def test_scoring_again_asks_and_drives_nothing(tmp_path: Path, dataset: Dataset,
     def nobody(workers: int) -> Any:
         raise AssertionError("no worker is needed")
 
-    run = make_run(folder, dataset, spec, planner=planner)
-    paper = run.run(quiet, Effort(engine=nobody), ruler="paper")
+    paper = make_run(folder, dataset, spec, planner=planner, metrics="paper").run(quiet, Effort(engine=nobody))
     assert {row["metrics"] for row in paper} == {"lampilot-paper-v1"} and planner.asked == []
-    origin = run.run(quiet, Effort(engine=nobody))
+    origin = make_run(folder, dataset, spec, planner=planner).run(quiet, Effort(engine=nobody))
     assert outcome(folder) == outcome(undisturbed)
     assert [row["rollout_key"] for row in paper] == [row["rollout_key"] for row in origin]
     assert any(a["ttc"] != b["ttc"] for a, b in zip(origin, paper, strict=True))
     with pytest.raises(ConfigError, match="Unknown ruler"):
-        run.run(quiet, ruler="thumb")
+        make_run(folder, dataset, spec, metrics="thumb")

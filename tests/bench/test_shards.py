@@ -8,14 +8,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from chauffeur.bench.kernel.merge import made_of, merge_shards
 from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import RowStore
-from chauffeur.bench.lampilot.frozen import Frozen
-from chauffeur.bench.lampilot.merge import merge_shards
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway.dblv1 import Dataset
-from small_run import finish, make_data, make_run, outcome, recorded
+from small_run import benchmark, finish, make_data, make_run, outcome, recorded
 
 SLURM = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_MIN": "1", "SLURM_ARRAY_TASK_COUNT": "4"}
 
@@ -106,9 +105,16 @@ def parts(tmp_path_factory: pytest.TempPathFactory, dataset: Dataset, spec: str)
     return found
 
 
+def _merge(out: Path, folders: list[Path], dataset: Dataset, spec: str) -> None:
+    name, options = made_of(folders[0])
+    merge_shards(out, folders, benchmark(dataset, spec), {"name": name, "options": dict(options)})
+
+
 @pytest.mark.slow
-def test_merged_shards_are_the_unsharded_run(tmp_path: Path, whole: Path, parts: list[Path]) -> None:
-    merge_shards(tmp_path / "merged", list(reversed(parts)))
+def test_merged_shards_are_the_unsharded_run(
+    tmp_path: Path, dataset: Dataset, spec: str, whole: Path, parts: list[Path]
+) -> None:
+    _merge(tmp_path / "merged", list(reversed(parts)), dataset, spec)
     assert outcome(tmp_path / "merged") == outcome(whole)
     for name in ("plan.json", "provenance.json"):
         assert (tmp_path / "merged" / name).read_bytes() == (whole / name).read_bytes()
@@ -116,7 +122,7 @@ def test_merged_shards_are_the_unsharded_run(tmp_path: Path, whole: Path, parts:
         merged, one = (RowStore(folder / f"{name}.jsonl", key).rows for folder in (tmp_path / "merged", whole))
         assert merged == one
     before = (tmp_path / "merged" / "rollout.jsonl").read_bytes()
-    merge_shards(tmp_path / "merged", parts)
+    _merge(tmp_path / "merged", parts, dataset, spec)
     assert (tmp_path / "merged" / "rollout.jsonl").read_bytes() == before, "merging again adds nothing"
 
 
@@ -125,7 +131,7 @@ def test_a_merged_run_goes_on_and_is_scored_like_any_other(
     tmp_path: Path, dataset: Dataset, spec: str, whole: Path, parts: list[Path]
 ) -> None:
     merged = tmp_path / "merged"
-    done = CliRunner().invoke(app, ["bench", "merge", str(merged), *map(str, parts), "--metrics", "paper"])
+    done = CliRunner().invoke(app, ["bench", "merge", str(merged), *map(str, parts), "-o", "metrics=paper"])
     assert done.exit_code == 0, done.output
     assert "20 items of 3 shards" in done.output and "lampilot-paper-v1" in done.output
     assert outcome(merged) != outcome(whole)
@@ -140,21 +146,21 @@ def test_what_is_not_one_whole_run_is_not_merged(
 ) -> None:
     out = tmp_path / "out"
     with pytest.raises(ConfigError, match="missing 2"):
-        merge_shards(out, [parts[0], parts[2]])
+        _merge(out, [parts[0], parts[2]], dataset, spec)
     with pytest.raises(ConfigError, match="twice 1"):
-        merge_shards(out, [*parts, parts[0]])
+        _merge(out, [*parts, parts[0]], dataset, spec)
     with pytest.raises(ConfigError, match="number of shards"):
-        merge_shards(out, [*parts[:2], whole])
+        _merge(out, [*parts[:2], whole], dataset, spec)
     with pytest.raises(DataError, match=r"plan\.json"):
-        merge_shards(out, [tmp_path / "nowhere"])
+        _merge(out, [tmp_path / "nowhere"], dataset, spec)
 
     other = make_run(tmp_path / "other", dataset, spec, items=12, shard=Shard(3, 3))
-    with pytest.raises(ConfigError, match="differ in config, planned"):
-        merge_shards(out, [*parts[:2], other.folder])
+    with pytest.raises(ConfigError, match="config, planned differ"):
+        _merge(out, [*parts[:2], other.folder], dataset, spec)
 
     begun = make_run(tmp_path / "begun", dataset, spec, shard=Shard(3, 3))
     with pytest.raises(DataError, match="begun is not finished"):
-        merge_shards(out, [*parts[:2], begun.folder])
+        _merge(out, [*parts[:2], begun.folder], dataset, spec)
 
     spoiled = tmp_path / "spoiled"
     spoiled.mkdir()
@@ -163,7 +169,7 @@ def test_what_is_not_one_whole_run_is_not_merged(
     lines = (spoiled / "rollout.jsonl").read_bytes().splitlines(keepends=True)
     (spoiled / "rollout.jsonl").write_bytes(b"".join([lines[0][:40] + b"#" + lines[0][41:], *lines[1:]]))
     with pytest.raises(DataError, match="spoiled is not finished"):
-        merge_shards(out, [*parts[:2], spoiled])
+        _merge(out, [*parts[:2], spoiled], dataset, spec)
     assert not (out / "results.jsonl").exists()
 
 
@@ -179,10 +185,37 @@ def test_the_command_gives_each_shard_its_folder(tmp_path: Path, dataset: Datase
         assert f"shard {number}/2" in done.output
     folders = sorted((tmp_path / "run").glob("shard-*"))
     assert [folder.name for folder in folders] == ["shard-1-of-2", "shard-2-of-2"]
-    assert sum(len(Frozen.read(folder).items) for folder in folders) == 3
+    assert sum(len(json.loads((folder / "plan.json").read_text())["items"]) for folder in folders) == 3
     merged = CliRunner().invoke(app, ["bench", "merge", str(tmp_path / "run"), *map(str, folders)])
     assert merged.exit_code == 0, merged.output
     rows = [json.loads(line) for line in (tmp_path / "run" / "results.jsonl").read_text().splitlines()]
     assert len(rows) == 3
     bad = CliRunner().invoke(app, [*arguments, "--shard", "4/2"])
     assert bad.exit_code == 2
+
+
+def test_a_run_of_an_earlier_version_is_refused_and_taken_over(tmp_path: Path, dataset: Dataset, spec: str) -> None:
+    """Its plan does not say how the benchmark was made; else it is the same, and the same command goes on with it."""
+    shard, whole = Shard(1, 1), tmp_path / "run"
+    run = make_run(whole, dataset, spec, shard=shard, items=2)
+    rows = finish(run)
+    plan = json.loads((whole / "plan.json").read_text())
+    del plan["made"]
+    (whole / "plan.json").write_text(json.dumps(plan))
+    refused = CliRunner().invoke(app, ["bench", "merge", str(tmp_path / "out"), str(whole)])
+    assert refused.exit_code == 2 and "takes over what its shards have done" in " ".join(refused.output.split())
+    assert finish(make_run(whole, dataset, spec, items=2)) == rows
+
+
+def test_shards_of_any_benchmark_are_merged(tmp_path: Path) -> None:
+    command = ["bench", "faithfulness", "--items", "2", "--workers", "1", "--out"]
+    for shard in ("1/2", "2/2"):
+        assert CliRunner().invoke(app, [*command, str(tmp_path / "run"), "--shard", shard]).exit_code == 0
+    merged = CliRunner().invoke(app, ["bench", "merge", str(tmp_path / "out"), *map(str, (tmp_path / "run").iterdir())])
+    assert merged.exit_code == 0, merged.output
+    assert CliRunner().invoke(app, [*command, str(tmp_path / "whole")]).exit_code == 0
+    assert outcome(tmp_path / "out") == outcome(tmp_path / "whole")
+    changed = CliRunner().invoke(
+        app, ["bench", "merge", str(tmp_path / "out"), str(tmp_path / "whole"), "-o", "items=3"]
+    )
+    assert changed.exit_code == 2 and "have changed" in " ".join(changed.output.split())

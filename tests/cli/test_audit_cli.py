@@ -6,12 +6,11 @@ import io
 from pathlib import Path
 
 import pytest
-import typer
 from rich.console import Console
 from typer.testing import CliRunner, Result
 
-from chauffeur.cli.audit import audit_app, auditor_for, tell_closing
-from chauffeur.cli.failures import FriendlyGroup
+from chauffeur.cli.audit import auditor_for, tell_closing
+from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, Instruction, PersonId
 from chauffeur.driving.events import DriveEvent
 from chauffeur.driving.scenarios import find
@@ -19,16 +18,6 @@ from chauffeur.safety.audit import AuditLog, Closing, head_path
 
 KEY = b"a key of thirty-two bytes, quite"
 COMMANDS = ["verify", "redact"]
-
-app = typer.Typer(cls=FriendlyGroup)
-
-
-@app.callback()
-def root() -> None:
-    """As the `chauffeur` command."""
-
-
-app.add_typer(audit_app, name="audit")
 
 
 def invoke(*arguments: object, answer: str = "") -> Result:

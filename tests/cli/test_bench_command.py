@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from chauffeur.bench.openloop import OpenLoopBenchmark
-from chauffeur.cli.lab.bench_plugin import command_of
+from chauffeur.cli.lab.bench import command_of
 from chauffeur.cli.main import app
 from chauffeur.concept.registry import load_plugin
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -66,7 +66,10 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(data: Path, tmp_
     assert "paper: Human driver" in done.stdout
 
 
-@pytest.mark.parametrize("name", ["faithfulness", "hostile", "leaderboard", "motion", "openloop", "personalization"])
+@pytest.mark.parametrize(
+    "name",
+    ["faithfulness", "hostile", "lampilot", "leaderboard", "motion", "openloop", "passengers", "personalization"],
+)
 def test_the_options_of_a_benchmark_are_those_it_states(name: str) -> None:
     """Each parameter of its class or function, with its default and the sentence of its docstring."""
     make = load_plugin("chauffeur.benchmarks", name)

@@ -19,7 +19,7 @@ from typer.testing import CliRunner, Result
 
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
-from chauffeur.cli.lab.bench_plugin import BenchGroup, command_of
+from chauffeur.cli.lab.bench import BenchGroup, command_of
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.concept.extras import install_command

@@ -12,20 +12,10 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner, Result
 
-from chauffeur.cli.failures import FriendlyGroup
-from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.cli.main import app
 from chauffeur.safety.audit import read_records, verify
-
-app = typer.Typer(cls=FriendlyGroup)
-app.add_typer(vehicle_app, name="vehicle")
-
-
-@app.callback()
-def root() -> None:
-    """As the `chauffeur` command."""
 
 
 @pytest.fixture

@@ -11,15 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner, Result
 
 pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
 
 from rosbridge_server import ENGAGE, FOLLOWER, REPLANNER, Bridge, eventually, free_port
 
-from chauffeur.cli.failures import FriendlyGroup
-from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.cli.main import app
 from chauffeur.worlds.ros import VehicleError
 from chauffeur.worlds.ros.engage import WORDS, engage
 from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
@@ -27,16 +25,6 @@ from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
 pytestmark = pytest.mark.server
 
 COMMANDS = ["check", "apply", "release", "watch", "engage", "disengage"]
-
-app = typer.Typer(cls=FriendlyGroup)
-
-
-@app.callback()
-def root() -> None:
-    """As the `chauffeur` command."""
-
-
-app.add_typer(vehicle_app, name="vehicle")
 
 
 def invoke(*arguments: object) -> Result:
@@ -67,7 +55,8 @@ def written(path: Path, url: str, stack: str = "autoware.ai") -> Path:
 
 
 def test_help_has_examples(file: Path) -> None:
-    assert "chauffeur vehicle apply vehicle.toml --speed 8 --dry-run" in one_line(invoke("--help"))
+    told = CliRunner().invoke(app, ["vehicle", "--help"])
+    assert "chauffeur vehicle apply vehicle.toml --speed 8 --dry-run" in one_line(told)
     for command in COMMANDS:
         assert invoke(command, "--help").exit_code == 0
 

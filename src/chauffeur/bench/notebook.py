@@ -10,22 +10,24 @@ from typing import Any
 
 from chauffeur.bench.evaluation.parts import Evaluated, Options, PlannedPart, Profile
 from chauffeur.bench.evaluation.run import Evaluation
-from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.benchmark import GROUP, asked_by, benchmark_from, takes_planner
 from chauffeur.bench.kernel.pipeline import Watch
 from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.stages import made_by
 from chauffeur.bench.kernel.store import Row
+from chauffeur.concept.registry import load_plugin
 from chauffeur.hmi.notebook import library
 from chauffeur.planners.base import Answerer, Planner
-from chauffeur.planners.registry import make_answerer, make_planner
 
 
-def run_named(name: str, planner: str | Planner | Answerer, *, out: Path, workers: int, **options: Any) -> Rows:
+def run_named(name: str, planner: str | Planner | Answerer | None, *, out: Path, workers: int, **options: Any) -> Rows:
     """Run an installed benchmark; see `chauffeur.run_benchmark`."""
-    benchmark = make_benchmark(name, **options)
-    make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
-    asked = make(planner) if make is not None and isinstance(planner, str) else planner
-    run = BenchRun(out, benchmark, None if make is None or isinstance(asked, str) else asked)
+    make = load_plugin(GROUP, name)
+    if planner is not None and takes_planner(make):
+        options["planner"] = planner if isinstance(planner, str) else planner.id
+    benchmark = benchmark_from(make, name, **options)
+    run = BenchRun(out, benchmark, asked_by(benchmark, planner), made=made_by(name, options))
     return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
 
 

@@ -6,10 +6,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("apis")
-
 
 def apis(
     name: Annotated[str, typer.Argument(help="One of them, in full; all in short without it.")] = "",

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -36,23 +34,13 @@ Key = Annotated[
     typer.Option("--key", metavar="FILE", envvar=KEY_VARIABLE, help="Key that the log was written with."),
 ]
 
-EXAMPLES = help_text("audit")
 
-VERIFY_EXAMPLES = help_text("audit VERIFY_EXAMPLES")
-
-REDACT_EXAMPLES = """
-Examples:
-
-    chauffeur audit redact trips/audit.jsonl --as ana
-"""
-
-
-@audit_app.callback(epilog=EXAMPLES)
+@audit_app.callback()
 def audit() -> None:
     """Audit logs of drives."""
 
 
-@audit_app.command("verify", epilog=VERIFY_EXAMPLES)
+@audit_app.command("verify")
 def verify_log(
     path: Log,
     head: Annotated[
@@ -75,7 +63,7 @@ def verify_log(
         raise typer.Exit(FAILED)
 
 
-@audit_app.command("redact", epilog=REDACT_EXAMPLES)
+@audit_app.command("redact")
 def redact_log(
     path: Log,
     person: Annotated[str, typer.Option("--as", help="Whose words are erased.")],

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -17,8 +15,6 @@ if TYPE_CHECKING:
 
     from chauffeur.camera import ImageTruth
     from chauffeur.concept.weather import Weather
-
-EXAMPLES = help_text("camera")
 
 
 def camera(

@@ -4,134 +4,103 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
 from chauffeur.concept import ConfigError
 from chauffeur.concept.lab import needs_lab
+from chauffeur.concept.registry import load_plugin, made, module_at, plugin_at, plugin_names
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
 
-EXAMPLES = help_text("check")
-
-check_app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    help="Check whether a plug-in of your own keeps its contract.",
-    epilog=EXAMPLES,
-)
-
-
-@check_app.callback()
-def check() -> None:
-    """Check whether a plug-in of your own keeps its contract."""
+_TAKES: Final[dict[str, tuple[str, ...]]] = {
+    "world": ("scenario", "config", "seed"),
+    "planner": ("base_url",),
+    "executor": ("policy", "scenario"),
+    "benchmark": ("option",),
+    "api": (),
+}
+"""Options that a kind of plug-in is checked with."""
 
 
-@check_app.command(epilog=EXAMPLES)
-def world(
-    name: Annotated[
-        str, typer.Argument(metavar="MODULE[:NAME]", help="The world's class or factory, or a registered name.")
+def check(
+    kind: Annotated[
+        Literal["world", "planner", "executor", "benchmark", "api"], typer.Argument(metavar="KIND", help="What it is.")
     ],
-    scenario: Annotated[str, typer.Option(help="A built-in scenario to check it on.")] = "",
-    config: Annotated[str, typer.Option(help="Configuration of the scenario, as JSON.")] = "{}",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
-) -> None:
-    """Run a world through the contract's checks: time, road graph, commands, perception, driver, and so on.
-
-    Exit code 1 where a check finds something.
-    """
-    from chauffeur.worlds.conformance import check_world
-
-    _tell(check_world(_world_class(name), _scenario(name, scenario, config, seed)))
-
-
-@check_app.command(epilog=EXAMPLES)
-def planner(
     name: Annotated[
-        str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:NAME; then /ARGUMENT.")
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="MODULE:NAME of its class or factory, or a registered name; of a planner, then /ARGUMENT.",
+        ),
     ],
+    scenario: Annotated[str, typer.Option(help="Of a world, an executor: a built-in scenario to check it on.")] = "",
+    config: Annotated[str, typer.Option(help="Of a world: configuration of the scenario, as JSON.")] = "{}",
+    seed: Annotated[int, typer.Option(min=0, help="Of a world: seed of the scenario.")] = 0,
+    policy: Annotated[
+        str, typer.Option(metavar="MODULE:NAME", help="Of an executor: a policy of its kind to try it with.")
+    ] = "",
     base_url: BaseUrl = None,
+    option: BenchOptions = None,
 ) -> None:
-    """Ask a planner usual and strange things: who it is, plans that can be driven, no surprises.
+    """Check whether a plug-in of your own, a world, planner, executor, benchmark or driving API, keeps its contract.
 
-    It is asked some twenty times. Exit code 1 where a check finds something.
+    A world is run through time, road graph, commands, perception, driver, and so on. A planner is asked usual and
+    strange things, some twenty times. An executor drives a policy twice. Of a benchmark the first item is run. A
+    driving API is asked on a motorway and at a crossing. Exit code 1 where a check finds something.
     """
+    given = {"scenario": scenario, "config": config != "{}", "seed": seed, "policy": policy}
+    given |= {"base_url": base_url, "option": option}
+    if strange := [one for one, value in given.items() if value and one not in _TAKES[kind]]:
+        raise ConfigError(f"A {kind} is not checked with --{strange[0].replace('_', '-')}.", hint="Leave it out.")
+    match kind:
+        case "world":
+            from chauffeur.worlds.conformance import check_world
+
+            _tell(check_world(_world_class(name), _scenario(name, scenario, config, seed)))
+        case "planner":
+            _tell(_of_planner(name, base_url))
+        case "executor":
+            _tell(_of_executor(name, policy, scenario or "cruise"))
+        case "benchmark":
+            _tell(_of_benchmark(name, option or []))
+        case "api":
+            from chauffeur.driving.conformance import check_api
+            from chauffeur.programs.catalogue import GROUP
+
+            _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
+
+
+def _of_planner(name: str, base_url: str | None) -> Sequence[ConformanceFinding]:
     from chauffeur.cli.parts import planner_options
     from chauffeur.driving.conformance import check_planner
     from chauffeur.planners.registry import make_planner
 
-    options = planner_options(name, base_url)
-    _tell(check_planner(make_planner(name, **options)))
+    return check_planner(make_planner(name, **planner_options(name, base_url)))
 
 
-@check_app.command(epilog=EXAMPLES)
-def executor(
-    name: Annotated[str, typer.Argument(metavar="MODULE:NAME", help="The executor's class or factory.")],
-    policy: Annotated[str, typer.Option(metavar="MODULE:NAME", help="A policy of its kind to try it with.")],
-    scenario: Annotated[str, typer.Option(help="A built-in scenario to drive it on.")] = "cruise",
-) -> None:
-    """Drive a policy with its executor: vouched for, finite commands, the same trip twice, held back by set-points.
-
-    Exit code 1 where a check finds something.
-    """
-    from chauffeur.concept.registry import made, plugin_at
+def _of_executor(name: str, policy: str, scenario: str) -> Sequence[ConformanceFinding]:
     from chauffeur.driving.conformance import check_executor
 
+    if not policy:
+        raise ConfigError("An executor is tried with a policy of its kind.", hint="Name one: --policy MODULE:NAME.")
     tried = plugin_at(policy)
     tried = made("policy", policy, tried) if isinstance(tried, type) or not hasattr(tried, "kind") else tried
-    _tell(check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0)))
+    return check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0))
 
 
-@check_app.command(epilog=EXAMPLES)
-def benchmark(
-    name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:NAME.")],
-    option: BenchOptions = None,
-) -> None:
-    """Hold a benchmark against the kernel's protocol; its first item is run.
-
-    Exit code 1 where a check finds something.
-    """
+def _of_benchmark(name: str, option: Sequence[str]) -> Sequence[ConformanceFinding]:
     needs_lab("Checking a benchmark")
     from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
-    from chauffeur.concept.registry import plugin_at
+    from chauffeur.cli.parts import named_values
 
-    given = read_options(option or [])
+    given = named_values(option)
     own = ":" in name
-    _tell(check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given)))
-
-
-@check_app.command(epilog=EXAMPLES)
-def api(
-    name: Annotated[str, typer.Argument(metavar="API", help="A registered driving API, or MODULE:NAME.")],
-) -> None:
-    """Ask a driving API of your own on a motorway and at a crossing: its shape, answers, repetition and time.
-
-    Exit code 1 where a check finds something.
-    """
-    from chauffeur.concept.registry import load_plugin, plugin_at
-    from chauffeur.driving.conformance import check_api
-    from chauffeur.programs.catalogue import GROUP
-
-    _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
-
-
-def read_options(given: list[str]) -> dict[str, Any]:
-    """Options of a benchmark: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
-    found: dict[str, Any] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise ConfigError(f"{text!r} is no option.", hint="Write -o NAME=VALUE.")
-        try:
-            found[name] = json.loads(value)
-        except ValueError:
-            found[name] = value
-    return found
+    return check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given))
 
 
 def _tell(findings: Sequence[ConformanceFinding]) -> None:
@@ -155,7 +124,6 @@ def _tell(findings: Sequence[ConformanceFinding]) -> None:
 
 def _maker(kind: str, name: str) -> Callable[..., Any]:
     """The class or function at `module:NAME`: a check makes several of its kind. Raises ConfigError."""
-    from chauffeur.concept.registry import plugin_at
 
     found = plugin_at(name)
     if not callable(found):
@@ -165,7 +133,6 @@ def _maker(kind: str, name: str) -> Callable[..., Any]:
 
 def _world_class(name: str) -> Callable[[], Any]:
     """What makes the world at `module:NAME`, the only one of a module, or a registered one. Raises ConfigError."""
-    from chauffeur.concept.registry import load_plugin, module_at, plugin_names
 
     module_name, _, class_name = name.partition(":")
     if not class_name and module_name in plugin_names("chauffeur.worlds"):
@@ -185,7 +152,6 @@ def _world_class(name: str) -> Callable[[], Any]:
 
 def _scenario(name: str, scenario: str, config: str, seed: int) -> Any:
     """The scenario to check on. Raises ConfigError."""
-    import json
     from dataclasses import replace
 
     from chauffeur.concept import ConfigError, Scenario

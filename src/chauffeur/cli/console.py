@@ -8,7 +8,7 @@ from here prints has gone through `printable`, whichever command prints it.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,16 @@ def columns(rows: Iterable[tuple[Text | str, RenderableType]], *, indent: int = 
     for name, value in rows:
         grid.add_row(Text(" " * indent) + (name if isinstance(name, Text) else Text(name)), value)
     return grid
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, right: Sequence[str] = ()) -> Table:
+    """A table without lines below bold headings; the columns called so in `right` hold numbers."""
+    shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    for heading in headings:
+        shown.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
+    for row in rows:
+        shown.add_row(*row)
+    return shown
 
 
 def path_text(path: Path) -> Text:

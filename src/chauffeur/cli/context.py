@@ -7,13 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from chauffeur.describe.services import Position, Surroundings
     from chauffeur.describe.services.surroundings import Row
-
-EXAMPLES = help_text("context")
 
 
 def context(
@@ -76,9 +72,7 @@ def position(at: str, heading: float | None, accuracy: float) -> Position:
 
 
 def _print_words(found: Surroundings) -> None:
-    from rich.table import Table
-
-    from chauffeur.cli.console import plain, stdout
+    from chauffeur.cli.console import plain, stdout, table
     from chauffeur.describe.services.units import age_words
 
     console = stdout()
@@ -92,13 +86,12 @@ def _print_words(found: Surroundings) -> None:
     if not known:
         return
     console.print()
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for heading in ("Reading", "Value", "Source", "Age", "Confidence"):
-        table.add_column(heading, overflow="fold")
-    for row in known:
-        age = "" if row.age_s is None else age_words(row.age_s)
-        table.add_row(row.name, plain(_value(row)), plain(row.source), age, f"{row.confidence:.2f}")
-    console.print(table)
+    lines = [
+        (row.name, plain(_value(row)), plain(row.source), "" if row.age_s is None else age_words(row.age_s),
+         f"{row.confidence:.2f}")
+        for row in known
+    ]  # fmt: skip
+    console.print(table(("Reading", "Value", "Source", "Age", "Confidence"), lines))
     if any(row.source.startswith("OpenStreetMap") for row in known):
         console.print("Map data: OpenStreetMap contributors, ODbL.", style="dim")
 

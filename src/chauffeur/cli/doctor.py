@@ -16,12 +16,6 @@ import typer
 from chauffeur.concept.extras import LAB, install_command
 from chauffeur.concept.lab import has_lab
 
-EXAMPLES = """
-Examples:
-
-    chauffeur doctor
-"""
-
 _PURPOSES = {
     "models": "training our own models",
     "transformers": "open models in this process",

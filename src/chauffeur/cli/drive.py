@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
-from chauffeur.cli.options import AuditFile
+from chauffeur.cli.options import AuditFile, BaseUrl, LimitsName, Quiet, TrafficSeed
 
 if TYPE_CHECKING:
     from chauffeur.driving.recording import RecordedTrip
-
-EXAMPLES = help_text("drive")
 
 SEEN: Final = (
     "The planner is told what BEV-LLM sees in rendered pictures; checks and safety filter use the world's own state."
@@ -36,9 +33,9 @@ def drive(
         ),
     ] = "",
     person: Annotated[str, typer.Option("--as", help="Whose wish it is; their history is recalled and kept.")] = "",
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
+    seed: TrafficSeed = None,
     save: Annotated[Path | None, typer.Option(help="Folder for recording, page and filmstrip.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=_RESEARCH)] = None,
+    base_url: BaseUrl = None,
     setting: Annotated[
         str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.", rich_help_panel=_RESEARCH)
     ] = "few-shot",
@@ -50,9 +47,7 @@ def drive(
             rich_help_panel=_RESEARCH,
         ),
     ] = "state",
-    limits: Annotated[
-        str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.", rich_help_panel=_RESEARCH)
-    ] = "default",
+    limits: LimitsName = "default",
     data: Annotated[
         Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.", rich_help_panel=_RESEARCH)
     ] = None,
@@ -65,7 +60,7 @@ def drive(
             rich_help_panel=_RESEARCH,
         ),
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
+    quiet: Quiet = False,
     full: Annotated[
         bool, typer.Option("--full", help="Print everything as it comes, in SI units: helpers, scores, provenance.")
     ] = False,

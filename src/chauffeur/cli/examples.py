@@ -1,4 +1,4 @@
-"""Examples in the help of every command: a group's serve the commands that have none of their own."""
+"""Examples in the help of every command, out of `examples.md`."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from typer.core import TyperGroup
 
+def give_examples(command: Any, words: tuple[str, ...] = (), above: str = "") -> None:
+    """Let the help of a command, and of all commands below it, end with its examples.
 
-class WithExamples(TyperGroup):
-    """A group of commands; one without an epilog shows those of the group's examples that begin with its name."""
-
-    def __init__(self, **attributes: Any) -> None:
-        super().__init__(**attributes)
-        lines = [line for line in (self.epilog or "").splitlines() if line.startswith("    chauffeur ")]
-        for name, command in self.commands.items():
-            own = [line for line in lines if f" {self.name} {name} " in f"{line} "]
-            if not command.epilog and own:
-                command.epilog = "\nExamples:\n\n" + "\n\n".join(own) + "\n"
+    Args:
+        command: A click command or group.
+        words: Behind `chauffeur`, they name it.
+        above: Examples of its group: where it has none, those of them that are its own are shown.
+    """
+    own = help_text_or_none(" ".join(words) or "chauffeur")
+    if own is None:
+        begins = f"    chauffeur {' '.join(words)} "
+        lines = [line for line in above.splitlines() if f"{line} ".startswith(begins)]
+        own = "\nExamples:\n\n" + "\n\n".join(lines) + "\n" if lines else None
+    command.epilog = command.epilog or own
+    for name, child in getattr(command, "commands", {}).items():
+        give_examples(child, (*words, name), command.epilog or "")
 
 
 @cache
@@ -29,11 +33,6 @@ def _texts() -> dict[str, str]:
     return {name: body.strip("\n") for name, body in zip(parts[::2], parts[1::2], strict=True)}
 
 
-def help_text(name: str) -> str:
-    """What the help of a module's commands ends with, out of `examples.md`."""
-    return f"\n{_texts()[name]}\n"
-
-
 def help_text_or_none(name: str) -> str | None:
-    """As `help_text`; None where there are no examples."""
-    return help_text(name) if name in _texts() else None
+    """What the help of a command ends with; None where there are no examples of it."""
+    return f"\n{_texts()[name]}\n" if name in _texts() else None

@@ -6,10 +6,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("feedback")
-
 
 def feedback(
     words: Annotated[str, typer.Argument(help="What you have to say of the drive.")],

@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.labels import NOT_HEARD
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.speech import Heard, Recogniser
-
-EXAMPLES = help_text("hear")
 
 
 def hear(

@@ -1,10 +1,30 @@
-"""Ctrl-C while something drives: the first asks it to come to an end, the second ends it at once."""
+"""Ctrl-C: long work is kept; of what drives the first asks it to come to an end, the second ends it at once."""
 
 from __future__ import annotations
 
 import signal
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+@contextmanager
+def stopped_kindly(console: Console, *kept: Path | None) -> Generator[None]:
+    """Answer Ctrl-C in long work: say where what is done is kept, and leave with code 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        where = " and ".join(str(path) for path in kept if path is not None)
+        said = f" What is done is kept in {where}; run the same command to go on." if where else ""
+        console.print(f"Stopped.{said}", soft_wrap=True)
+        raise typer.Exit(130) from None
 
 
 class Interrupts:

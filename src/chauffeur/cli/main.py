@@ -27,8 +27,8 @@ from chauffeur.cli import (
     what_if,
 )
 from chauffeur.cli.audit import audit_app
-from chauffeur.cli.check import check_app
-from chauffeur.cli.examples import help_text
+from chauffeur.cli.check import check
+from chauffeur.cli.examples import give_examples
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
@@ -37,10 +37,6 @@ from chauffeur.cli.vehicle import vehicle_app
 from chauffeur.concept.lab import LAB_COMMANDS, has_lab, needs_lab
 from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.version import __version__
-
-EXAMPLES = help_text("main")
-
-SHOW_EXAMPLES = help_text("main SHOW_EXAMPLES")
 
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
 """What somebody comes for; the headings of `chauffeur --help`."""
@@ -52,9 +48,15 @@ COMMANDS: Final = "chauffeur.commands"
 class ChauffeurGroup(FriendlyGroup):
     """The commands written here, and one for each that an installed package registers."""
 
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        give_examples(self)
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all of them."""
-        known = super().list_commands(ctx)
+        panels = [DRIVE, LOOK, MEASURE, BUILD]
+        commands: Any = self.commands
+        known = sorted(super().list_commands(ctx), key=lambda name: panels.index(commands[name].rich_help_panel))
         return [*known, *(name for name in plugin_names(COMMANDS) if name not in known)]
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -79,13 +81,11 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=EXAMPLES,
 )
 show_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Show scenarios, driving APIs, policies, the context of a place, a trip's page, what is heard, what is seen.",
-    epilog=SHOW_EXAMPLES,
 )
 
 
@@ -105,34 +105,29 @@ def chauffeur(
     del version
 
 
-app.command(epilog=drive.EXAMPLES, rich_help_panel=DRIVE)(drive.drive)
-app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
-app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
+app.command(rich_help_panel=DRIVE)(drive.drive)
+app.command(rich_help_panel=DRIVE)(talk.talk)
+app.command(rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
-app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK, short_help="A recorded trip again, bit for bit.")(
-    replay.replay
-)
+app.command(rich_help_panel=LOOK, short_help="A recorded trip again, bit for bit.")(replay.replay)
 app.command(
     "what-if",
-    epilog=what_if.EXAMPLES,
     rich_help_panel=LOOK,
     short_help="A recorded trip with another planner, side by side.",
 )(what_if.what_if)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
-app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK, short_help="Check this installation.")(doctor.doctor)
-app.command(epilog=plugins.EXAMPLES, rich_help_panel=LOOK, short_help="What is installed, and of whom.")(
-    plugins.plugins
-)
-show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
-show_app.command(epilog=apis.EXAMPLES)(apis.apis)
-show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
-show_app.command(epilog=context.EXAMPLES)(context.context)
-show_app.command(epilog=meaning.EXAMPLES)(meaning.meaning)
-show_app.command(epilog=page.EXAMPLES)(page.page)
-show_app.command(epilog=camera.EXAMPLES)(camera.camera)
-show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
-show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
+app.command(rich_help_panel=LOOK, short_help="Check this installation.")(doctor.doctor)
+app.command(rich_help_panel=LOOK, short_help="What is installed, and of whom.")(plugins.plugins)
+show_app.command()(scenarios.scenarios)
+show_app.command()(apis.apis)
+show_app.command("policies")(policies.show_policies)
+show_app.command()(context.context)
+show_app.command()(meaning.meaning)
+show_app.command()(page.page)
+show_app.command()(camera.camera)
+show_app.command()(unmasking.unmasking)
+show_app.command("speech")(hear.hear)
 
 if has_lab():
     from chauffeur.cli.lab import commands as lab
@@ -142,7 +137,7 @@ if has_lab():
 app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
 app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
-app.add_typer(check_app, name="check", rich_help_panel=BUILD)
+app.command(rich_help_panel=BUILD)(check)
 
 
 def run() -> None:

@@ -7,21 +7,16 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples, help_text
-
 maps_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Towns to drive in: list, build, fetch, export and draw them.",
 )
 
-EXAMPLES = help_text("maps")
-
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the pack; by default the user's maps folder.")]
 
 
-@maps_app.callback(epilog=EXAMPLES)
+@maps_app.callback()
 def maps() -> None:
     """Towns to drive in."""
 

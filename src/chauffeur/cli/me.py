@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples, help_text
-
 if TYPE_CHECKING:
     from chauffeur.memory.privacy import Privacy
 
 me_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="What is remembered of you: see it, take it with you, erase it.",
@@ -21,10 +18,8 @@ me_app = typer.Typer(
 
 Person = Annotated[str, typer.Option("--as", help="Whose profile.")]
 
-EXAMPLES = help_text("me")
 
-
-@me_app.callback(epilog=EXAMPLES)
+@me_app.callback()
 def me() -> None:
     """What is remembered of you."""
 

@@ -10,13 +10,11 @@ import typer
 from rich.text import Text
 
 from chauffeur.cli.console import plain, stdout
-from chauffeur.cli.examples import help_text
 from chauffeur.concept import ConfigError, DataError
 
 if TYPE_CHECKING:
     from chauffeur.concept.utterance import Utterance
 
-EXAMPLES = help_text("meaning")
 _UNSURE = 0.5
 """Below this the reading is more likely wrong than right: the car would ask."""
 

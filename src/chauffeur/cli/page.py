@@ -7,10 +7,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("page")
-
 
 def page(
     recording: Annotated[Path, typer.Argument(metavar="TRIP.mcap", help="The recorded trip.")],

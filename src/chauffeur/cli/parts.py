@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib.util import find_spec
+import json
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits
 from chauffeur.concept.lab import needs_lab
+from chauffeur.concept.needs import needs
 
 if TYPE_CHECKING:
     from chauffeur.concept import Context, Observation
@@ -17,29 +18,6 @@ if TYPE_CHECKING:
     from chauffeur.planners.prompts import Setting
 
 _LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
-
-
-def needs(extra: str, what: str, *modules: str) -> None:
-    """Say before any work is done that an extra is missing. Nothing is imported.
-
-    Args:
-        extra: The extra of this package that brings the modules.
-        what: Who needs it, as the subject of a sentence.
-        modules: Top-level modules.
-
-    Raises:
-        MissingExtraError: One cannot be found; the hint installs the extra for this interpreter.
-    """
-    missing = [name for name in modules if not _importable(name)]
-    if missing:
-        raise MissingExtraError(f"{what} needs {', '.join(missing)}.", extra=extra)
-
-
-def _importable(name: str) -> bool:
-    try:
-        return find_spec(name) is not None
-    except ValueError:  # it is being kept from being imported
-        return False
 
 
 def limits_named(name: str) -> Limits:
@@ -106,6 +84,20 @@ def planner_options(spec: str, base_url: str | None) -> dict[str, Any]:
     """
     options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
     return options | {"attempts": 1, "stream": False} if spec.startswith("openai/") else options
+
+
+def named_values(given: Sequence[str]) -> dict[str, Any]:
+    """Values of `-o NAME=VALUE`: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise ConfigError(f"{text!r} is no option.", hint="Write -o NAME=VALUE.")
+        try:
+            found[name] = json.loads(value)
+        except ValueError:
+            found[name] = value
+    return found
 
 
 def engine_named(spec: str) -> AsrEngine | None:

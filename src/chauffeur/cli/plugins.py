@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
     from chauffeur.concept.registry import Plugin
-
-EXAMPLES = help_text("plugins")
 
 
 def plugins(

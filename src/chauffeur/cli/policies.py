@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples, help_text
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -17,7 +15,6 @@ if TYPE_CHECKING:
     from chauffeur.memory.policies import Merged, PolicyEntry, PolicyRepository, Rejected
 
 policies_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Policy repositories (programs that did well, learned from feedback): describe, prune, share.",
@@ -26,12 +23,8 @@ policies_app = typer.Typer(
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="A program's name as it is called, or its id.")]
 
-SHOW_EXAMPLES = help_text("policies SHOW_EXAMPLES")
 
-EXAMPLES = help_text("policies")
-
-
-@policies_app.callback(epilog=EXAMPLES)
+@policies_app.callback()
 def policies() -> None:
     """Policy repositories."""
 
@@ -49,10 +42,9 @@ def show_policies(
 
 
 def _list(folder: Path, query: str) -> None:
-    from rich.table import Table
     from rich.text import Text
 
-    from chauffeur.cli.console import path_text, plain, stdout
+    from chauffeur.cli.console import path_text, plain, stdout, table
     from chauffeur.memory.policies import CRITIC_LABELS
 
     console = stdout()
@@ -66,21 +58,19 @@ def _list(folder: Path, query: str) -> None:
         )
         likeness = {one.entry.id: one.similarity for one in recalled}
         entries = tuple(sorted(entries, key=lambda entry: -likeness.get(entry.id, 0.0)))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name in ("program", "learned for", "road", "judged by", "score", *(("near",) if query else ())):
-        table.add_column(name, justify="right" if name in ("score", "near") else "left", overflow="fold")
-    for entry in entries:
-        who = "person" if entry.judged_by == "person" else "evaluator (not a person)"
-        near = (f"{likeness.get(entry.id, 0.0):.2f}",) if query else ()
-        table.add_row(
+    lines = [
+        (
             Text(f"{entry.callable_name}()", "bold"),
             plain(entry.command),
             plain(entry.world),
-            who,
+            "person" if entry.judged_by == "person" else "evaluator (not a person)",
             _score(entry),
-            *near,
+            *((f"{likeness.get(entry.id, 0.0):.2f}",) if query else ()),
         )
-    console.print(table)
+        for entry in entries
+    ]
+    heads = ("program", "learned for", "road", "judged by", "score", *(("near",) if query else ()))
+    console.print(table(heads, lines, right=("score", "near")))
     console.print(path_text(folder), plain(f"{len(entries)} programs, sha256 {repository.digest[:12]}"))
     for label in repository.labels or (CRITIC_LABELS["person"],) * bool(entries):
         console.print(plain(label), style="bold")

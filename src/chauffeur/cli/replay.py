@@ -12,12 +12,6 @@ if TYPE_CHECKING:
 
     from chauffeur.driving.recording import Difference
 
-EXAMPLES = """
-Examples:
-
-    chauffeur replay trips/hurry/trip.mcap
-"""
-
 
 def replay(
     recording: Annotated[Path, typer.Argument(metavar="TRIP.mcap", help="The recorded trip.")],

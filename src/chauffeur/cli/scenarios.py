@@ -7,10 +7,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("scenarios")
-
 _SHOWN = 40
 
 
@@ -20,9 +16,7 @@ def scenarios(
     every: Annotated[bool, typer.Option("--all", help="All of them, however many.")] = False,
 ) -> None:
     """List the scenarios: the built-in ones and, with a data folder, LaMPilot's own samples."""
-    from rich.table import Table
-
-    from chauffeur.cli.console import plain, stdout
+    from chauffeur.cli.console import plain, stdout, table
     from chauffeur.concept import ScenarioError
     from chauffeur.driving.scenarios import BUILT_IN, DATA_VARIABLE, list_scenarios
 
@@ -32,12 +26,8 @@ def scenarios(
     if not found:
         raise ScenarioError(f"No scenario matches {find!r}.", hint="Run `chauffeur show scenarios` for the whole list.")
     shown = found if every else found[:_SHOWN]
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for heading in ("Scenario", "Road", "A wish it shows well"):
-        table.add_column(heading, no_wrap=heading == "Scenario", overflow="fold")
-    for scenario in shown:
-        table.add_row(plain(scenario.id), plain(scenario.title), plain(scenario.wish))
-    console.print(table)
+    lines = [(plain(one.id), plain(one.title), plain(one.wish)) for one in shown]
+    console.print(table(("Scenario", "Road", "A wish it shows well"), lines))
     if len(shown) < len(found):
         console.print(f"... and {len(found) - len(shown)} more: add --all, or --find WORD.")
     if data is None and all(scenario in BUILT_IN for scenario in found):

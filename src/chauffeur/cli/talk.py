@@ -7,18 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
-from chauffeur.cli.options import AuditFile, Wishes
+from chauffeur.cli.options import (
+    VOICE,
+    AuditFile,
+    BaseUrl,
+    LimitsName,
+    Microphone,
+    MicrophoneDevice,
+    Quiet,
+    Speak,
+    SpeechEngine,
+    TrafficSeed,
+    Wishes,
+)
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
 
-EXAMPLES = help_text("talk")
-
 STOPPED_WITH_CTRL_C: Final = 130
 _QUIET_ROAD: Final = "overtake"
 """Where one drives until something is wished."""
-_VOICE: Final = "Voice and page"
 _TRIP_S: Final = 75.0
 """A road takes about so long; then another begins."""
 
@@ -34,10 +42,10 @@ def talk(
             show_default=False,
         ),
     ] = "",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint of the planner.")] = None,
+    base_url: BaseUrl = None,
     scenario: Annotated[str | None, typer.Option(help="Where to drive; default one that suits the first wish.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
-    limits: Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")] = "default",
+    seed: TrafficSeed = None,
+    limits: LimitsName = "default",
     duration: Annotated[
         float, typer.Option(min=1.0, max=7200.0, help="Seconds to drive at most, in the car's time.")
     ] = 900.0,
@@ -51,26 +59,14 @@ def talk(
     realtime: Annotated[
         bool, typer.Option("--realtime/--no-realtime", help="Whether control asks for real-time scheduling.")
     ] = True,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
-    engine: Annotated[
-        str,
-        typer.Option(
-            help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`, or `none`.", rich_help_panel=_VOICE
-        ),
-    ] = "grammar",
-    microphone: Annotated[
-        bool,
-        typer.Option(
-            "--microphone/--no-microphone", help="Listen to this machine's microphone.", rich_help_panel=_VOICE
-        ),
-    ] = False,
-    device: Annotated[str, typer.Option(help="Which one: number or part of its name.", rich_help_panel=_VOICE)] = "",
+    quiet: Quiet = False,
+    engine: SpeechEngine = "grammar",
+    microphone: Microphone = False,
+    device: MicrophoneDevice = "",
     page: Annotated[
-        bool, typer.Option("--page/--no-page", help="Open the cabin page in the browser.", rich_help_panel=_VOICE)
+        bool, typer.Option("--page/--no-page", help="Open the cabin page in the browser.", rich_help_panel=VOICE)
     ] = False,
-    speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).", rich_help_panel=_VOICE)] = (
-        False
-    ),
+    speak: Speak = False,
     audit: AuditFile = None,
 ) -> None:
     """Drive in real time and talk: it says what it thinks and what was checked, and remembers how you liked it."""

@@ -7,10 +7,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("unmasking")
-
 
 def unmasking(
     wish: Annotated[str, typer.Argument(help="Where you want to park or to drive, in your own words.")],

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from chauffeur.cli import egodriver
-from chauffeur.cli.examples import WithExamples, help_text
-from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
+from chauffeur.cli.options import DryRun, VehicleFile, VehicleWait
+from chauffeur.cli.vehicle_drive import drive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,28 +19,22 @@ if TYPE_CHECKING:
     from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
 
 vehicle_app = typer.Typer(
-    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Vehicles behind ROS: what is asked of them, and how the way to them is.",
 )
 
-EXAMPLES = help_text("vehicle")
-
 _NOT_FROM_HERE: Final = "Only a vehicle with Autoware.AI behind rosbridge is engaged and disengaged from here."
 _ON_ITS_OWN_SCREEN: Final = "Use the vehicle's own screen."
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")]
-Wait = Annotated[float, typer.Option(min=0.5, max=60.0, help="Seconds to look for the vehicle.")]
 
-
-@vehicle_app.callback(epilog=EXAMPLES)
+@vehicle_app.callback()
 def vehicle() -> None:
     """Vehicles behind ROS."""
 
 
 @vehicle_app.command()
-def check(file: File, wait: Wait = 5.0) -> None:
+def check(file: VehicleFile, wait: VehicleWait = 5.0) -> None:
     """Say what the file allows, and whether the vehicle can be reached. Nothing is published."""
     from chauffeur.cli.console import columns, plain, stdout
     from chauffeur.cli.failures import FAILED
@@ -61,24 +56,20 @@ def check(file: File, wait: Wait = 5.0) -> None:
     if isinstance(stack, AutowareAi) and isinstance(stack.source, ConstantSpeed):
         words = f"Planned stops are IGNORED: {stack.source.acknowledgement.name} answers for it."
         console.print(plain(words), style="bold red")
-    car = open_vehicle(settings)
-    try:
+    with closing(open_vehicle(settings)) as car:
         state = _wait_for(car, wait, lambda state: state.link in ("up", "refused", "dry-run"))
-        _show(state)
-    finally:
-        car.close()
     if state.link not in ("up", "dry-run"):
         raise typer.Exit(FAILED)
 
 
 @vehicle_app.command()
 def apply(
-    file: File,
+    file: VehicleFile,
     speed: Annotated[float, typer.Option(help="Target speed, m/s: the cap on planned speeds.")],
     look_ahead: Annotated[float, typer.Option(help="Look-ahead, m.")] = 8.0,
     ratio: Annotated[float, typer.Option(help="Look-ahead per speed, s.")] = 2.0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be published; publish nothing.")] = False,
-    wait: Wait = 5.0,
+    dry_run: DryRun = False,
+    wait: VehicleWait = 5.0,
 ) -> None:
     """Ask the vehicle for parameters, once. They stay in force when the command ends."""
     from chauffeur.cli.console import echo, plain, stdout
@@ -88,8 +79,7 @@ def apply(
     from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
-    car = open_vehicle(read_settings(file), dry_run=dry_run)
-    try:
+    with closing(open_vehicle(read_settings(file), dry_run=dry_run)) as car:
         published = car.apply(Parameters(speed, look_ahead, ratio))
         stdout().print(plain(published.words))
         if isinstance(car, DryRun):
@@ -98,36 +88,29 @@ def apply(
             stdout().print("Dry run: nothing was published.")
             return
         state = _wait_for(car, wait, lambda state: state.delivered or state.link == "refused")
-        _show(state)
-    finally:
-        car.close()
     if not state.delivered:
         stdout().print("Not delivered: the vehicle was not asked.", style="bold")
         raise typer.Exit(FAILED)
 
 
 @vehicle_app.command()
-def release(file: File, wait: Wait = 5.0) -> None:
+def release(file: VehicleFile, wait: VehicleWait = 5.0) -> None:
     """Take the speed cap back: the vehicle drives as its own planner plans, which may be faster."""
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
-    car = open_vehicle(read_settings(file))
-    try:
+    with closing(open_vehicle(read_settings(file))) as car:
         stdout().print(plain(car.release().words))
         state = _wait_for(car, wait, lambda state: state.delivered or state.link == "dry-run")
-        _show(state)
-    finally:
-        car.close()
     if not state.delivered and state.link != "dry-run":
         raise typer.Exit(FAILED)
 
 
 @vehicle_app.command()
 def watch(
-    file: File,
+    file: VehicleFile,
     duration: Annotated[float, typer.Option(min=1.0, help="Seconds to watch; default until Ctrl-C.")] = 86400.0,
 ) -> None:
     """Show the way to the vehicle and its speed, a line when something changes. Nothing is published."""
@@ -136,9 +119,8 @@ def watch(
     from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
-    car = open_vehicle(read_settings(file))
     shown = ""
-    try:
+    with closing(open_vehicle(read_settings(file))) as car, suppress(KeyboardInterrupt):
         end_s = time.monotonic() + duration
         while time.monotonic() < end_s:
             state = car.state()
@@ -146,18 +128,14 @@ def watch(
                 _show(state)
             shown = line
             time.sleep(0.2)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        car.close()
 
 
-vehicle_app.command(epilog=DRIVE_EXAMPLES)(drive)
-vehicle_app.command(epilog=egodriver.EXAMPLES)(egodriver.egodriver)
+vehicle_app.command()(drive)
+vehicle_app.command()(egodriver.egodriver)
 
 
 @vehicle_app.command()
-def engage(file: File, wait: Wait = 5.0) -> None:
+def engage(file: VehicleFile, wait: VehicleWait = 5.0) -> None:
     """Engage drive-by-wire. A word is shown, and a person has to type it."""
     import sys
 
@@ -179,7 +157,7 @@ def engage(file: File, wait: Wait = 5.0) -> None:
 
 
 @vehicle_app.command()
-def disengage(file: File, wait: Wait = 5.0) -> None:
+def disengage(file: VehicleFile, wait: VehicleWait = 5.0) -> None:
     """Give the vehicle back to its driver. Nothing has to be typed for it."""
     from chauffeur.cli.console import plain, stdout
     from chauffeur.worlds.ros.engage import disengage as disengage_vehicle
@@ -202,12 +180,13 @@ def _engaged_over(file: Path) -> RosbridgeSettings:
 
 
 def _wait_for(car: VehicleInterface, within_s: float, enough: Callable[[RosVehicleState], bool]) -> RosVehicleState:
-    """The first state that is enough, or the last one seen."""
+    """The first state that is enough, or the last one seen; it is shown."""
     import time
 
     end_s = time.monotonic() + within_s
     while not enough(state := car.state()) and time.monotonic() < end_s:
         time.sleep(0.02)
+    _show(state)
     return state
 
 

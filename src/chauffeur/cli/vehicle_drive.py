@@ -8,19 +8,28 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
-from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
+from chauffeur.cli.options import (
+    AuditFile,
+    BaseUrl,
+    DryRun,
+    Microphone,
+    MicrophoneDevice,
+    Quiet,
+    Speak,
+    SpeechEngine,
+    VehicleFile,
+    VehicleWait,
+    Wishes,
+)
 
 if TYPE_CHECKING:
     pass
-
-DRIVE_EXAMPLES: Final = help_text("vehicle_drive DRIVE_EXAMPLES")
 
 _STOPPED_WITH_CTRL_C: Final = 130
 
 
 def drive(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")],
+    file: VehicleFile,
     wishes: Wishes = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; what they said before counts.")] = "",
     planner: Annotated[
@@ -32,17 +41,13 @@ def drive(
         typer.Option(metavar="FILE", help="Where the place, map, weather and rules come from; see docs/services.md."),
     ] = None,
     audit: AuditFile = None,
-    engine: Annotated[
-        str, typer.Option(help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`.")
-    ] = "grammar",
-    microphone: Annotated[
-        bool, typer.Option("--microphone/--no-microphone", help="Listen to this machine's microphone.")
-    ] = False,
-    device: Annotated[str, typer.Option(help="Which one: number or part of its name.")] = "",
-    speak: Annotated[bool, typer.Option("--speak", help="Say answers aloud (espeak-ng).")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be published; publish nothing.")] = False,
-    wait: Annotated[float, typer.Option(min=0.5, max=60.0, help="Seconds to look for the vehicle.")] = 5.0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print what became of each wish only.")] = False,
+    engine: SpeechEngine = "grammar",
+    microphone: Microphone = False,
+    device: MicrophoneDevice = "",
+    speak: Speak = False,
+    dry_run: DryRun = False,
+    wait: VehicleWait = 5.0,
+    quiet: Quiet = False,
 ) -> None:
     """Say what you want of a real vehicle: it is planned, checked, written down, asked of the vehicle, confirmed."""
     import asyncio

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
 if TYPE_CHECKING:
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from chauffeur.concept.units import SpeedUnit
     from chauffeur.driving.recording import RecordedTrip
 
-EXAMPLES = help_text("what_if")
 _TOLD: Final = 400
 """Characters of the reasoning that are shown; language models write pages, which the recordings hold."""
 

@@ -43,7 +43,7 @@ _SIGN_M: Final = 1.6
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class DrawnShape:
     """Something to draw, in m.
 
     Attributes:
@@ -71,62 +71,62 @@ class Shape:
     start: bool = False
 
 
-def road_shapes(road: PaintedRoad) -> Iterator[Shape]:
+def road_shapes(road: PaintedRoad) -> Iterator[DrawnShape]:
     """Everything that does not move, names of streets left out."""
     for extra, look in ((3.0, "verge"), (0.8, "edge"), (0.06, "asphalt")):
         for surface in road.surfaces:
             more = min(extra, 1.2) if surface.kind in ("parking", "aisle") else extra
-            yield Shape("line", look, surface.centre_m, surface.width_m + more)
+            yield DrawnShape("line", look, surface.centre_m, surface.width_m + more)
     for outline in road.islands_m:
-        yield Shape("area", "asphalt", outline)
+        yield DrawnShape("area", "asphalt", outline)
     for surface in road.surfaces:
         if surface.emergency:
-            yield Shape("line", "emergency", surface.centre_m, surface.width_m)
+            yield DrawnShape("line", "emergency", surface.centre_m, surface.width_m)
     for bar in road.bars_m:
-        yield Shape("line", "paint", bar, BAR_M)
+        yield DrawnShape("line", "paint", bar, BAR_M)
     for line in road.lines:
-        yield Shape(
+        yield DrawnShape(
             "line", "centre" if line.style == "centre" else "paint", line.points_m, dashed=line.style == "dashed"
         )
     for sign in road.signs:
         yield from _sign_shapes(sign)
 
 
-def _sign_shapes(sign: PaintedSign) -> Iterator[Shape]:
+def _sign_shapes(sign: PaintedSign) -> Iterator[DrawnShape]:
     x, y = sign.post_m
     if sign.line_m is not None:
-        yield Shape("line", "paint", sign.line_m, 0.5)
+        yield DrawnShape("line", "paint", sign.line_m, 0.5)
     if sign.kind == "speed_limit":
-        yield Shape("dot", "rim", (sign.post_m,), _SIGN_M)
-        yield Shape("dot", "plate", (sign.post_m,), 0.75 * _SIGN_M)
-        yield Shape("text", "word", (sign.post_m,), 0.9 * _SIGN_M, sign.text)
+        yield DrawnShape("dot", "rim", (sign.post_m,), _SIGN_M)
+        yield DrawnShape("dot", "plate", (sign.post_m,), 0.75 * _SIGN_M)
+        yield DrawnShape("text", "word", (sign.post_m,), 0.9 * _SIGN_M, sign.text)
         return
     corners, first = (8, math.pi / 8.0) if sign.kind == "stop" else (3, math.pi / 2.0)
     angles = [first + 2.0 * math.pi * i / corners for i in range(corners)]
-    yield Shape("area", "stop", tuple((x + _SIGN_M * math.cos(a), y + _SIGN_M * math.sin(a)) for a in angles))
+    yield DrawnShape("area", "stop", tuple((x + _SIGN_M * math.cos(a), y + _SIGN_M * math.sin(a)) for a in angles))
     if sign.text:
-        yield Shape("text", "plate", (sign.post_m,), 0.6 * _SIGN_M, sign.text)
+        yield DrawnShape("text", "plate", (sign.post_m,), 0.6 * _SIGN_M, sign.text)
 
 
-def scene_shapes(so_far: Sequence[Observation], seen: Bounds) -> Iterator[Shape]:
+def scene_shapes(so_far: Sequence[Observation], seen: Bounds) -> Iterator[DrawnShape]:
     """The ego at the last of the instants with its way so far, and who else is seen there."""
     shot = so_far[-1]
-    yield Shape("line", "trail", tuple((each.ego.x_m, each.ego.y_m) for each in (*so_far[::5], shot)), 0.5)
+    yield DrawnShape("line", "trail", tuple((each.ego.x_m, each.ego.y_m) for each in (*so_far[::5], shot)), 0.5)
     for thing in (*shot.objects, *shot.others):
         if not (seen.x0 <= thing.x_m <= seen.x1 and seen.y0 <= thing.y_m <= seen.y1):
             continue
         place = ((thing.x_m, thing.y_m),)
         if thing.kind == "static":
-            yield Shape("dot", "cone", place, max(thing.length_m, thing.width_m) / 2.0)
+            yield DrawnShape("dot", "cone", place, max(thing.length_m, thing.width_m) / 2.0)
         elif thing.kind == "pedestrian":
-            yield Shape("dot", "other", place, 0.5, paint=_paint(thing))
+            yield DrawnShape("dot", "other", place, 0.5, paint=_paint(thing))
         elif thing.kind != "stop_sign":
             yield _body(thing, "obstacle" if thing.kind == "obstacle" else "other")
     yield _body(shot.ego, "ego")
 
 
-def _body(body: VehicleState, look: str) -> Shape:
-    return Shape(
+def _body(body: VehicleState, look: str) -> DrawnShape:
+    return DrawnShape(
         "car",
         f"{look} crashed".removeprefix("other ") if body.crashed else look,
         ((body.x_m, body.y_m),),
@@ -143,7 +143,7 @@ def _paint(body: VehicleState) -> str:
 # As SVG ---------------------------------------------------------------------------------------------------------------
 
 
-def svg_of(shapes: Iterable[Shape]) -> str:
+def svg_of(shapes: Iterable[DrawnShape]) -> str:
     """Elements whose class is their look; they need `SYMBOLS` on their page for cars, and the colours of `LOOKS`."""
     return "".join(_element(shape) for shape in shapes)
 
@@ -158,7 +158,7 @@ def style_of_looks() -> str:
     )
 
 
-def _element(shape: Shape) -> str:
+def _element(shape: DrawnShape) -> str:
     x, y = shape.points[0]
     points = " ".join(f"{px:.1f},{py:.1f}" for px, py in shape.points)
     look = f'class="r-{shape.kind}" color="{shape.paint}"' if shape.paint else f'class="r-{shape.kind} r-{shape.look}"'
@@ -183,7 +183,7 @@ def _element(shape: Shape) -> str:
             return _car(shape, x, y)
 
 
-def _car(shape: Shape, x: float, y: float) -> str:
+def _car(shape: DrawnShape, x: float, y: float) -> str:
     turn = math.degrees(shape.heading_rad) % 360.0
     place = f"translate({x:.1f} {y:.1f})"
     if round(turn, 1) not in (0.0, 360.0):
@@ -212,7 +212,7 @@ class Canvas:
         self._draw = ImageDraw.Draw(self.image)
         self._scale, self._middle = scale, middle_m
 
-    def paint(self, shapes: Iterable[Shape]) -> None:
+    def paint(self, shapes: Iterable[DrawnShape]) -> None:
         """Draw them, each over those before it."""
         for shape in shapes:
             self._paint(shape)
@@ -228,7 +228,7 @@ class Canvas:
             (point[1] - self._middle[1]) * self._scale + self.image.height / 2.0,
         )
 
-    def _paint(self, shape: Shape) -> None:
+    def _paint(self, shape: DrawnShape) -> None:
         colour = shape.paint or LOOKS[shape.look.rpartition(" ")[2]]
         x, y = self._at(shape.points[0])
         match shape.kind:
@@ -247,7 +247,7 @@ class Canvas:
             case "car":
                 self._body(shape, colour)
 
-    def _body(self, shape: Shape, colour: str) -> None:
+    def _body(self, shape: DrawnShape, colour: str) -> None:
         (length, width), edge = shape.size, LOOKS["ego-edge" if shape.look.startswith("ego") else "car-edge"]
         if shape.look.startswith("ego"):
             self._draw.polygon(
@@ -267,7 +267,7 @@ class Canvas:
         places = [(ahead + u / 2.0, v / 2.0) for u, v in around]
         return [self._at((place[0] + c * u - s * v, place[1] + s * u + c * v)) for u, v in places]
 
-    def _write(self, shape: Shape, x: float, y: float, colour: str) -> None:
+    def _write(self, shape: DrawnShape, x: float, y: float, colour: str) -> None:
         font = ImageFont.load_default(max(10.0, shape.width * self._scale))
         if not shape.heading_rad:
             halo = round(0.25 * shape.width * self._scale) if shape.look == "place" else 0  # it stands across roads

@@ -153,8 +153,8 @@ def _resumed(entry: CardEntry, before: CardEntry | None) -> CardEntry:
     """An entry as it stands: what the card has of the same run, or of one that is left out now."""
     if before is None:
         return entry
-    same = (before.bench, dict(before.config)) == (entry.bench, dict(entry.config))
-    return before if same or (not entry.bench and entry.why == LEFT_OUT) else entry
+    same = entry.bench and (before.bench, dict(before.config)) == (entry.bench, dict(entry.config))
+    return before if same or entry.why == LEFT_OUT else entry
 
 
 def _left(budget: SpendingBudget, spent: Bill) -> SpendingBudget:

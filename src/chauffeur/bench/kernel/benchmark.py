@@ -7,6 +7,7 @@ registered as an entry point in the group `chauffeur.benchmarks`; `chauffeur ben
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ConfigError, Context, Plan, Scenario
 from chauffeur.concept.registry import load_plugin, made
-from chauffeur.planners.base import Prose
+from chauffeur.planners.base import Answerer, Planner, Prose
 
 GROUP: Final = "chauffeur.benchmarks"
 """Entry points of benchmarks: each is called with keyword options and gives a Benchmark."""
@@ -107,7 +108,11 @@ Asks = Literal["plans", "words", ""]
 
 
 class Benchmark(Protocol[T]):
-    """One benchmark, with everything that decides its results."""
+    """One benchmark, with everything that decides its results.
+
+    It may have, too: `judge`, who judges, in words; `labels`, what must be said wherever a row is shown; `variant`, its
+    options as the name of the default run folder shows them; `provenance`, versions beside the kernel's own.
+    """
 
     @property
     def id(self) -> str:
@@ -176,6 +181,15 @@ class Concludes(Protocol):
         ...
 
 
+@runtime_checkable
+class KeepsItems(Protocol):
+    """Optional part of a benchmark whose runs can be shown without the data they were drawn from."""
+
+    def kept(self, items: Sequence[Any]) -> Mapping[str, Any]:
+        """What is kept of items in `plan.json`, as JSON fields beside the kernel's own."""
+        ...
+
+
 class Unasked:
     """A benchmark whose jobs need no answers: it asks nobody."""
 
@@ -192,6 +206,33 @@ def make_benchmark(name: str, **options: Any) -> Benchmark[Any]:
         ConfigError: No such name, or an option it does not take.
     """
     return benchmark_from(load_plugin(GROUP, name), name, **options)
+
+
+def takes_planner(make: Any) -> bool:
+    """True if a benchmark's class or function is told who is asked: it drives with it, or notes it."""
+    return callable(make) and "planner" in inspect.signature(make).parameters
+
+
+def asked_by(
+    benchmark: Benchmark[Any], planner: str | Planner | Answerer | None, **options: Any
+) -> Planner | Answerer | None:
+    """Who answers a benchmark's requests; None where it makes none.
+
+    Args:
+        benchmark: Makes the requests.
+        planner: Who; by its specification `options` belong to it. By default `onboard`, for plans.
+
+    Raises:
+        ConfigError: A model has to be named, or there is none of that name.
+    """
+    if not benchmark.asks or not isinstance(planner, str | None):
+        return planner if benchmark.asks and not isinstance(planner, str) else None
+    if planner is None and benchmark.asks == "words":
+        raise ConfigError("Nobody is asked.", hint="Name a model with --planner, e.g. openai/gpt-4o.")
+    from chauffeur.planners.registry import make_answerer, make_planner
+
+    make = getattr(benchmark, "planner_of", None) or (make_planner if benchmark.asks == "plans" else make_answerer)
+    return make(planner or "onboard", **options)
 
 
 def benchmark_from(found: Any, name: str, **options: Any) -> Benchmark[Any]:

@@ -11,9 +11,10 @@ import asyncio
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -81,7 +82,7 @@ class BenchRun:
         planner: Planner | Answerer | None = None,
         *,
         shard: Shard = WHOLE,
-        manifest: Manifest[Any] | None = None,
+        made: Mapping[str, Any] | None = None,
     ) -> None:
         """Open or continue a run.
 
@@ -90,7 +91,7 @@ class BenchRun:
             benchmark: What is run.
             planner: Who is asked; None where nobody is. Its `labels`, where it has them, stand in every row.
             shard: Which part of the run.
-            manifest: What the run is about, where the benchmark freezes more than the kernel does.
+            made: How the benchmark was made (`name`, `options`); by that `merge_shards` makes it again.
 
         Raises:
             ConfigError: The folder holds a run with another configuration, or the planner is none for this benchmark.
@@ -108,20 +109,17 @@ class BenchRun:
         self.halt: Halt | None = None
         self.repeated = 0
         self._planner = planner if benchmark.asks else None
-        if manifest is None:
-            about = {**benchmark.config, **({} if planner is None else {"planner": planner.id})}
-            manifest = Manifest[Any].make(
-                benchmark.id,
-                about,
-                benchmark.items(),
-                model="" if planner is None else planner.model,
-                labels=getattr(planner, "labels", ()),
-                shard=shard,
-            )
-        self.manifest = manifest
+        self.manifest = Manifest[Any].of(
+            benchmark,
+            {**({} if planner is None else {"planner": planner.id}), **benchmark.config},
+            model="" if planner is None else planner.model,
+            labels=(*getattr(planner, "labels", ()), *getattr(benchmark, "labels", ())),
+            shard=shard,
+            made=made,
+        )
         with sole_writer(folder):
-            manifest.freeze(folder)
-        self.stages = StageStore[Any].open(folder, benchmark, manifest)
+            self.manifest.freeze(folder)
+        self.stages = StageStore[Any].open(folder, benchmark, self.manifest)
 
     @property
     def items(self) -> Any:
@@ -168,10 +166,11 @@ class BenchRun:
             finally:
                 for store in (*self.stages.stores, self.stages.live):
                     store.close()
-            rows = self.score()
+            rows = score(self.folder, self.stages)
             self.stages.live.clear()
-        vain = self._undriven()
-        if self.halt is None and self.manifest.shard == WHOLE and self._all(vain):
+        asked = [self.stages.outcome(item) for item in self.items if self.stages.asked(item)]
+        vain = [one for one in asked if one.undriven]
+        if self.halt is None and self.manifest.shard == WHOLE and 0 < len(vain) == len(asked):
             raise BenchError(
                 f"None of the {len(self.items)} items could be driven or asked, so there is no score. {_reasons(vain)}",
                 hint="The same command tries again."
@@ -179,14 +178,6 @@ class BenchRun:
                 else f"Is it the right file for this benchmark? Every item's reason is in {self.folder}.",
             )
         return rows
-
-    def _undriven(self) -> list[ItemOutcome[Any]]:
-        """Of the items that are accounted for, those of which nothing came for no fault of an answer."""
-        outcomes = (self.stages.outcome(item) for item in self.items if self.stages.asked(item))
-        return [one for one in outcomes if one.undriven]
-
-    def _all(self, outcomes: Sequence[ItemOutcome[Any]]) -> bool:
-        return 0 < len(outcomes) == sum(map(self.stages.asked, self.items))
 
     async def _work(self, watch: Watch, effort: Effort) -> None:
         loop = asyncio.get_running_loop()
@@ -202,7 +193,9 @@ class BenchRun:
         try:
             await engine.start()
             self.stages.live.clear()
-            pipeline = Pipeline(self.stages, engine, caller, scribe, watch, effort.concurrency, self._rows)
+            pipeline = Pipeline(
+                self.stages, engine, caller, scribe, watch, effort.concurrency, partial(rows_of, self.stages)
+            )
             await pipeline.work(broken)
             whole = True
         finally:
@@ -233,53 +226,49 @@ class BenchRun:
             effort.patience,
         )
 
-    @property
-    def about(self) -> Row:
-        """Fields of the run that stand in every row."""
-        about: Row = {"bench": self.benchmark.id, "chauffeur": __version__, "labels": list(self.manifest.labels)}
-        if self._planner is not None:
-            about |= {"planner": self._planner.id, "model": self._planner.model}
-        return about
 
-    def _rows(self, item: Any) -> list[Row]:
-        """An item's rows, from what is stored of it; what only all rows together tell is not in them."""
-        rows = self.benchmark.rows(self.stages.outcome(item))
-        return [{"item": item.id} | self.about | _fields(row) for row in rows]
+def rows_of(stages: StageStore[Any], item: Any) -> list[Row]:
+    """An item's rows, from what is stored of it; what only all rows together tell is not in them."""
+    manifest = stages.manifest
+    about: Row = {"bench": manifest.bench, "chauffeur": __version__, "labels": list(manifest.labels)}
+    if stages.benchmark.asks:
+        about |= {"planner": manifest.config.get("planner", ""), "model": manifest.model}
+    return [{"item": item.id} | about | _fields(row) for row in stages.benchmark.rows(stages.outcome(item))]
 
-    def score(self) -> list[Row]:
-        """All rows, from what is stored; written to `results.jsonl`, with `table.md`, `report.json` and
-        `provenance.json`.
 
-        Raises:
-            DataError: They cannot be written.
-        """
-        found = [row for item in self.items for row in self._rows(item)]
-        if isinstance(self.benchmark, ComparesRows):
-            found = [dict(row) for row in self.benchmark.together(found)]
-        lines = [json.dumps(row, ensure_ascii=True) for row in found]
-        rows: list[Row] = [json.loads(line) for line in lines]  # as they are read again: tuples become lists
-        undriven = self._undriven()
-        filled = () if self._all(undriven) else tables(self.benchmark.tables, rows)
-        asked = sum(map(self.stages.asked, self.items))
-        judge = str(getattr(self.benchmark, "judge", ""))
-        notes = [*self.manifest.labels, *([f"Judge: {judge}"] if judge else [])]
-        if asked < len(self.items):
-            notes.append(f"Partial: {asked} of {len(self.items)} items.")
-        if undriven:
-            share = 100.0 * len(undriven) / asked
-            notes.append(f"Not driven: {len(undriven)} of {asked} items ({share:.0f} %). {_reasons(undriven)}")
-        write_results(
-            self.folder,
-            {
-                "results.jsonl": "".join(line + "\n" for line in lines),
-                "table.md": report_markdown(self.benchmark.id, filled, notes),
-                "report.json": as_json(
-                    {"bench": self.benchmark.id, "judge": judge, "tables": [table.json for table in filled]}
-                ),
-                "provenance.json": as_json(self.manifest.provenance()),
-            },
-        )
-        return rows
+def score(folder: Path, stages: StageStore[Any]) -> list[Row]:
+    """All rows of a run, from what is stored; written to `results.jsonl`, with `table.md`, `report.json` and
+    `provenance.json`.
+
+    Raises:
+        DataError: They cannot be written.
+    """
+    benchmark, manifest = stages.benchmark, stages.manifest
+    found = [row for item in manifest.items for row in rows_of(stages, item)]
+    if isinstance(benchmark, ComparesRows):
+        found = [dict(row) for row in benchmark.together(found)]
+    lines = [json.dumps(row, ensure_ascii=True) for row in found]
+    rows: list[Row] = [json.loads(line) for line in lines]  # as they are read again: tuples become lists
+    asked = [stages.outcome(item) for item in manifest.items if stages.asked(item)]
+    undriven = [one for one in asked if one.undriven]
+    filled = () if 0 < len(undriven) == len(asked) else tables(benchmark.tables, rows)
+    judge = str(getattr(benchmark, "judge", ""))
+    notes = [*manifest.labels, *([f"Judge: {judge}"] if judge else [])]
+    if len(asked) < len(manifest.items):
+        notes.append(f"Partial: {len(asked)} of {len(manifest.items)} items.")
+    if undriven:
+        share = 100.0 * len(undriven) / len(asked)
+        notes.append(f"Not driven: {len(undriven)} of {len(asked)} items ({share:.0f} %). {_reasons(undriven)}")
+    told = {"bench": benchmark.id, "judge": judge, "tables": [table.json for table in filled]}
+    files = {
+        "results.jsonl": "".join(line + "\n" for line in lines),
+        "table.md": report_markdown(benchmark.id, filled, notes),
+        "report.json": _json(told),
+        "provenance.json": _json(manifest.provenance(getattr(benchmark, "provenance", {}))),
+    }
+    for name, text in files.items():
+        publish(folder / name, text.encode("utf-8", "replace"), "run's result")
+    return rows
 
 
 def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
@@ -288,15 +277,8 @@ def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
     return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
 
 
-def as_json(value: Any) -> str:
-    """A file's text."""
+def _json(value: Any) -> str:
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
-
-
-def write_results(folder: Path, files: dict[str, str]) -> None:
-    """Write what came of a run. Raises DataError when it cannot be written."""
-    for name, text in files.items():
-        publish(folder / name, text.encode("utf-8", "replace"), "run's result")
 
 
 def _fields(row: Any) -> Row:

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, Generic, Self, TypeVar
 
-from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob, Benchmark, ItemOutcome
+from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob, Benchmark, ItemOutcome, KeepsItems
 from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import Row, RowStore, freeze
 from chauffeur.concept import DataError
@@ -19,6 +19,9 @@ from chauffeur.concept.data import parse_json
 
 T = TypeVar("T", bound=BenchItem)
 
+PLAN: Final = "plan.json"
+"""A manifest's file in the folder of its run."""
+_MADE: Final = "made"
 LIVE: Final = "live.jsonl"
 """File of the rows of a run that has not been scored yet."""
 
@@ -36,6 +39,9 @@ class Manifest(Generic[T]):
         items: This part's items, in the run's order.
         places: Place of each in the whole run, from 0.
         planned: Items of the whole run.
+        more: What the benchmark keeps of this part's items (`kept`), so that a run can be shown without its data.
+        made: How the benchmark was made, `name` and `options`; empty where that is not known. It decides nothing: data
+            may have moved since.
     """
 
     bench: str
@@ -46,22 +52,27 @@ class Manifest(Generic[T]):
     items: tuple[T, ...]
     places: tuple[int, ...]
     planned: int
+    more: Mapping[str, Any]
+    made: Mapping[str, Any]
 
     @classmethod
-    def make(
+    def of(
         cls,
-        bench: str,
+        benchmark: Benchmark[T],
         config: Mapping[str, Any],
-        items: Sequence[T],
         *,
         model: str = "",
         labels: Sequence[str] = (),
         shard: Shard = WHOLE,
+        made: Mapping[str, Any] | None = None,
     ) -> Self:
         """Manifest of a run, or of a shard of it, that is to begin."""
-        places = tuple(place for place, item in enumerate(items) if shard.owns(item.id))
+        every = benchmark.items()
+        places = tuple(place for place, item in enumerate(every) if shard.owns(item.id))
+        items = tuple(every[place] for place in places)
         stored: dict[str, Any] = json.loads(json.dumps(dict(config)))
-        return cls(bench, stored, model, tuple(labels), shard, tuple(items[i] for i in places), places, len(items))
+        more = benchmark.kept(items) if isinstance(benchmark, KeepsItems) else {}
+        return cls(benchmark.id, stored, model, tuple(labels), shard, items, places, len(every), more, made or {})
 
     @property
     def about(self) -> dict[str, Any]:
@@ -74,11 +85,6 @@ class Manifest(Generic[T]):
             "planned": self.planned,
         }
 
-    @property
-    def more(self) -> dict[str, Any]:
-        """Further fields to freeze; none here."""
-        return {}
-
     def content(self) -> bytes:
         """The manifest as the file's content."""
         fields = {
@@ -87,6 +93,7 @@ class Manifest(Generic[T]):
             "items": [item.id for item in self.items],
             "places": list(self.places),
             **self.more,
+            **({_MADE: self.made} if self.made else {}),
         }
         # One line a field: short enough to read with `head -c`, and not a line for every number.
         lines = (f"{json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in fields.items())
@@ -99,14 +106,14 @@ class Manifest(Generic[T]):
             ConfigError: The folder holds another run.
             DataError: What is stored is damaged or cannot be written.
         """
-        path, content = folder / "plan.json", self.content()
+        path, content = folder / PLAN, self.content()
 
         def same(stored: bytes) -> bool:
-            return stored == content or parsed(path, stored) == json.loads(content)
+            return stored == content or _deciding(parsed(path, stored)) == _deciding(json.loads(content))
 
         freeze(path, content, "run's plan", same)
 
-    def provenance(self, **more: Any) -> dict[str, Any]:
+    def provenance(self, more: Mapping[str, Any]) -> dict[str, Any]:
         """Versions, configuration and the machine; `more` is the benchmark's."""
         return {
             "bench": self.bench,
@@ -118,6 +125,26 @@ class Manifest(Generic[T]):
             "python": platform.python_version(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
         }
+
+
+def made_by(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """How a benchmark was made, as a manifest keeps it: paths are absolute, what is no JSON is left out."""
+    kept = {key: str(value.absolute()) if isinstance(value, Path) else value for key, value in options.items()}
+    plain = {key: value for key, value in kept.items() if isinstance(value, str | int | float | bool | None)}
+    return {"name": name, "options": plain}
+
+
+def _deciding(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in fields.items() if name != _MADE}
+
+
+def read_plan(folder: Path) -> dict[str, Any]:
+    """The fields of a run folder's manifest. Raises DataError: there is none, or it is damaged."""
+    path = folder / PLAN
+    try:
+        return parsed(path, path.read_bytes())
+    except OSError as error:
+        raise DataError(f"Cannot read {path}: {error.strerror or error}.", hint="Is it a run's folder?") from error
 
 
 def parsed(path: Path, raw: bytes) -> dict[str, Any]:
@@ -224,16 +251,21 @@ def take_over_shards(stages: StageStore[Any], folder: Path) -> None:
     """
     for part in sorted(folder.glob("shard-*-of-*")):
         try:
-            about = parsed(part / "plan.json", (part / "plan.json").read_bytes())
-        except (OSError, DataError):
+            about = read_plan(part)
+        except DataError:
             continue
-        if any(about.get(name) != value for name, value in stages.manifest.about.items()):
-            continue
-        for store in stages.stores:
-            there = RowStore(part / store.path.name, store.key).rows
-            rows = [row for key, row in sorted(there.items()) if key not in store.rows or _better(row, store.rows[key])]
-            if rows:
-                store.append(*rows)
+        if all(about.get(name) == value for name, value in stages.manifest.about.items()):
+            take_over(stages, part)
+
+
+def take_over(stages: StageStore[Any], part: Path) -> None:
+    """Append the rows of another folder of the same run: what is absent here, or failed here only. Raises
+    StorageError."""
+    for store in stages.stores:
+        there = RowStore(part / store.path.name, store.key).rows
+        rows = [row for key, row in sorted(there.items()) if key not in store.rows or _better(row, store.rows[key])]
+        if rows:
+            store.append(*rows)
 
 
 def _better(row: Row, known: Row) -> bool:

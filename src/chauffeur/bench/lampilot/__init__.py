@@ -1,5 +1,5 @@
 """LaMPilot-Bench: instruction following on highway and intersection (paper Sec. IV-A)."""
 
-from chauffeur.bench.lampilot.runner import LampilotRun, lampilot
+from chauffeur.bench.lampilot.benchmark import LampilotBenchmark, lampilot
 
-__all__ = ["LampilotRun", "lampilot"]
+__all__ = ["LampilotBenchmark", "lampilot"]

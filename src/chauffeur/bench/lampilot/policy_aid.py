@@ -61,8 +61,6 @@ def offer(
 class PolicyAid:
     """Makes the requests of a run from a frozen repository."""
 
-    setting = HUMAN_FEEDBACK
-
     def __init__(self, folder: Path, limits: Limits, *, k: int = RECALLED) -> None:
         """Read a repository.
 

@@ -14,6 +14,16 @@ from chauffeur.worlds.highway.dblv1 import Item
 class Requests(Protocol):
     """Makes the request of an item."""
 
+    @property
+    def id(self) -> str:
+        """Identity of what decides them beside the prompt setting, item and limits; empty for the plain wish."""
+        ...
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Caveats to show with every result of these requests."""
+        ...
+
     async def request(self, item: Item, context: Context) -> PlanRequest:
         """Everything the planner is given. Raises ChauffeurError when the item cannot be asked."""
         ...
@@ -25,6 +35,8 @@ class PlainRequests:
 
     system: SystemMessage
     limits: Limits
+    id: str = ""
+    labels: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, setting: Setting, limits: Limits) -> Self:

@@ -34,8 +34,6 @@ from chauffeur.driving.planning import screened_request
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.base import Planner
 
-ROUNDS: Final = 5
-"""Attempts at most at a lesson."""
 _WANTED: Final = re.compile(r"asks for the way (left|right|straight)")
 _LANE: Final = re.compile(r"asks for the lane to the (left|right)")
 _MOVE_OVER: Final = """    for _ in range(400):
@@ -90,6 +88,7 @@ class TownCoach:
         repository: Where programs go that did well.
         limits: Bounds of the programs.
         seed: Of traffic, of where lessons begin, and of their words.
+        rounds: Attempts at most at a lesson.
         tell: Is told of every lesson when it is over.
     """
 
@@ -97,6 +96,7 @@ class TownCoach:
     repository: PolicyRepository
     limits: Limits
     seed: int = 0
+    rounds: int = 5
     tell: Callable[[TownLesson], None] = lambda _: None
 
     def coach(self, routes: Sequence[LeaderboardRoute], lessons: int) -> tuple[TownLesson, ...]:
@@ -138,7 +138,7 @@ class TownCoach:
     def _lesson(self, lesson: Lesson, runner: asyncio.Runner) -> TownLesson:
         rounds: list[Round] = []
         result = LessonResult(False, "")
-        for number in range(1, ROUNDS + 1):
+        for number in range(1, self.rounds + 1):
             try:
                 drive = LessonDrive(lesson, self.limits)
                 context = drive.context
@@ -155,7 +155,7 @@ class TownCoach:
                 return self._kept(lesson, number, plan, context, rounds)
             source = plan.policy.source if isinstance(plan.policy, Program) else plan.refusal
             rounds.append(Round(source, f"The evaluator (a program, not a person) says: {result.words}"))
-        return TownLesson(lesson, ROUNDS, result.words)
+        return TownLesson(lesson, self.rounds, result.words)
 
     def _kept(self, lesson: Lesson, attempts: int, plan: Plan, context: Context, rounds: Sequence[Round]) -> TownLesson:
         command = lesson.said.text

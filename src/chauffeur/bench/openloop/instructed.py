@@ -22,7 +22,6 @@ import numpy as np
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, register, share
-from chauffeur.bench.kernel.run import write_results
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark, OpenLoopItem, OpenLoopStatus, read_answer
@@ -32,6 +31,7 @@ from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleratio
 from chauffeur.bench.openloop.nuscenes import PlanningSample
 from chauffeur.bench.openloop.requests import OpenLoopSetting
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.driving.files import publish
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -240,7 +240,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
         if len(self.left_out) > _SHOWN:
             said.append(f"... and {len(self.left_out) - _SHOWN} more, in {folder / 'left_out.txt'}.")
         if self.left_out:
-            write_results(folder, {"left_out.txt": "".join(f"{line}\n" for line in self.left_out)})
+            publish(folder / "left_out.txt", "".join(f"{line}\n" for line in self.left_out).encode(), "run's result")
         said.append(
             "Gain: error without the instruction minus error with it, same model and scene. Annotators had seen the "
             "whole scene: an instruction is privileged, and may be about what comes after the 6 s. No navigation is "

@@ -1,15 +1,7 @@
 """Wishes in the words of passengers: an evaluation set written by hand, that no generator and no word list produced."""
 
-from chauffeur.bench.passengers.benchmark import passengers, requests_of, run_config
+from chauffeur.bench.passengers.benchmark import passengers
 from chauffeur.bench.passengers.loader import PassengerWish, as_dataset, load_wishes
 from chauffeur.bench.passengers.requests import PassengerRequests
 
-__all__ = [
-    "PassengerRequests",
-    "PassengerWish",
-    "as_dataset",
-    "load_wishes",
-    "passengers",
-    "requests_of",
-    "run_config",
-]
+__all__ = ["PassengerRequests", "PassengerWish", "as_dataset", "load_wishes", "passengers"]

@@ -1,4 +1,4 @@
-"""The wishes as values, and as a data set that `LampilotRun` drives."""
+"""The wishes as values, and as a data set that `LampilotBenchmark` drives."""
 
 from __future__ import annotations
 

@@ -15,6 +15,9 @@ from chauffeur.worlds.highway.dblv1 import Item
 class PassengerRequests:
     """Requests of a run over `as_dataset()`; without them no wish has a history, and "like last time" means nothing."""
 
+    id = "passengers"
+    labels: tuple[str, ...] = ()
+
     def __init__(self, plain: Requests, wishes: Iterable[PassengerWish]) -> None:
         """Wrap the requests of a run.
 

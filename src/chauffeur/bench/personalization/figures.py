@@ -187,11 +187,11 @@ _MEMORY: Final = _by_ground(
 CARD: Final = CardPart(
     (
         Headline(
-            "takeovers on the highway, without memory", _BASELINE, _rate("without"), "highway all",
+            "takeovers, highway", _BASELINE, _rate("without"), "highway all",
             paper=tuple(f"Highway {level}" for level in LEVELS),
         ),
         Headline(
-            "takeovers in the lot, with memory", _MEMORY, _rate("with"), "parking all",
+            "takeovers, lot, with memory", _MEMORY, _rate("with"), "parking all",
             paper=("driver A", "driver B", "driver C"),
         ),
     ),

@@ -1,18 +1,27 @@
-"""`chauffeur bench lampilot`: a planner on every item of a DbLv1 folder; `merge` puts shards of a run together."""
+"""`chauffeur bench` with the name of any installed benchmark: its options are the arguments of its class or function.
+`merge` puts the shards of a run together.
+
+A benchmark declares an option once, with type, default and sentence, in the signature and the `Args:` of what its entry
+point (`chauffeur.benchmarks`) names. How it is run is the same for all, and is declared here.
+"""
 
 from __future__ import annotations
 
-import os
+import difflib
+import inspect
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Any, Final, get_type_hints
 
 import typer
+from typer.core import TyperGroup
 
-from chauffeur.cli.examples import help_text
-from chauffeur.cli.lab.bench_plugin import BenchGroup
-from chauffeur.cli.lab.bench_run import carry_out, effort, finish, show_tables
+from chauffeur.cli.examples import help_text_or_none
+from chauffeur.cli.lab.bench_run import merge_folders, run_named
+from chauffeur.cli.lab.generated import command_taking, options_of
 from chauffeur.cli.options import (
     BaseUrl,
+    BenchOptions,
     Concurrency,
     MaxRequests,
     MaxUsd,
@@ -21,65 +30,124 @@ from chauffeur.cli.options import (
     ShardPart,
     Workers,
 )
-from chauffeur.cli.parts import planner_options
-from chauffeur.concept import LAMPILOT_LIMITS
+from chauffeur.cli.parts import named_values
+from chauffeur.concept import ConfigError
+from chauffeur.concept.registry import load_plugin, plugin_names
 
-if TYPE_CHECKING:
-    from rich.console import Console
+GROUP = "chauffeur.benchmarks"
+_ABOUT: Final = {
+    "faithfulness": (
+        "Are explanations that misstate their program found?",
+        "Explanations and programs, aligned and not: precision, recall and false alarms of the judge.",
+    ),
+    "hostile": (
+        "Attacks by words, and wishes that look like them.",
+        "Hostile words: 618 attacks in ten classes, and 270 harmless wishes that look like them.",
+    ),
+    "instructions": (
+        "Commands to park and drive, closed loop (Tab. XIII).",
+        "Commands driven closed loop: interactive parking and short drives (paper Tab. XIII).",
+    ),
+    "lampilot": (
+        "LaMPilot-Bench: instructions, driven (Tab. IV).",
+        "LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions.",
+    ),
+    "leaderboard": (
+        "CARLA Leaderboard 1.0: RC, IP, DS (Tab. V).",
+        "CARLA Leaderboard 1.0 anywhere: RC, IP and DS over routes with traffic, lights and scenarios.",
+    ),
+    "motion": (
+        "Gains in five kinds of weather (Tab. XI).",
+        "Gains for three manoeuvres in five kinds of weather: comfort, safety, alignment (paper Tab. XI).",
+    ),
+    "motion-passengers": (
+        "Takeovers with gains, by memory (Fig. 14-15).",
+        "Takeovers of simulated passengers by directness and memory, with gains (paper Fig. 14-15).",
+    ),
+    "nuplanqa": (
+        "Questions about pictures of a road (Tab. VI).",
+        "Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none.",
+    ),
+    "openloop": (
+        "Waypoints from a front picture (Tab. XII, doScenes).",
+        "Waypoints over three seconds from a front picture, or over six with an instruction (paper Tab. XII).",
+    ),
+    "passengers": (
+        "Hand-written wishes: driven, asked, or refused.",
+        "Hand-written wishes with the right outcome each: driven, asked back about, or refused.",
+    ),
+    "personalization": (
+        "Takeovers, without and with memory (Tab. VIII-X).",
+        "Takeover rates of simulated passengers, without and with memory (paper Tab. VIII, IX, X).",
+    ),
+    "realization": (
+        "Labelled commands, driven and judged by labels.",
+        "Labelled commands, staged, driven by what was read of them, and judged by the labels.",
+    ),
+}
+"""What our own are, in a list and in their help, without loading them: a list must not import what they need."""
 
-    from chauffeur.bench.kernel.store import Row
-    from chauffeur.bench.lampilot.runner import LampilotRun
-    from chauffeur.planners.base import Planner
 
-bench_app = typer.Typer(
-    cls=BenchGroup,
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    help="Run a benchmark of the field. Results are simulated drives.",
-)
+class BenchGroup(TyperGroup):
+    """The commands written by hand, and one for each other benchmark that is installed."""
 
-EXAMPLES = help_text("bench")
+    def list_commands(self, ctx: Any) -> list[str]:
+        known = super().list_commands(ctx)
+        return [*known, *(name for name in plugin_names(GROUP) if name not in known)]
 
-PASSENGER_EXAMPLES = help_text("bench PASSENGER_EXAMPLES")
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        return command if command is not None or cmd_name not in plugin_names(GROUP) else _listed(cmd_name)
 
-MERGE_EXAMPLES = help_text("bench MERGE_EXAMPLES")
-
-_NAME: Final = 30
-"""Longest planner name that leaves a table its columns; of a longer one the end is shown."""
-
-MetricsOption = Annotated[
-    str, typer.Option("--metrics", help="`origin` (LaMPilot's code) or `paper` (its equations as printed).")
-]
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
+            near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else "Run: chauffeur bench --help"
+            raise ConfigError(f"There is no benchmark {args[0]!r}.", hint=hint)
+        name, command, rest = super().resolve_command(ctx, args)
+        own = command is None or name is None or super().get_command(ctx, name) is not None
+        return name, command if own else command_of(str(name)), rest
 
 
-@bench_app.callback()
-def bench() -> None:
-    """Benchmarks."""
+def _listed(name: str) -> Any:
+    """A command as a list of commands shows it: the benchmark is not imported."""
+    app = typer.Typer(add_completion=False)
+    app.command(name, help=_about(name)[0])(lambda: None)
+    return typer.main.get_command(app)
 
 
-@bench_app.command(epilog=EXAMPLES, short_help="LaMPilot-Bench: instructions, driven (Tab. IV).")
-def lampilot(
-    data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
+def _about(name: str) -> tuple[str, str]:
+    said = f"The benchmark {name!r}, from an installed package."
+    return _ABOUT.get(name, (said, said))
+
+
+def command_of(name: str) -> Any:
+    """The click command of a benchmark.
+
+    Raises:
+        ConfigError: There is no such benchmark, or it cannot be loaded.
+    """
+    make = load_plugin(GROUP, name)
+    own = options_of(make)
+    asked = asks(make)
+    shared = [
+        parameter
+        for parameter in inspect.signature(_shared, eval_str=True).parameters.values()
+        if parameter.name not in {option.name for option in own} and (asked or parameter.name not in _OF_ASKING)
+    ]
+
+    def run(**given: Any) -> None:
+        run_named(name, make, {option.name: given[option.name] for option in own}, given)
+
+    about = _about(name)[1] if name in _ABOUT else _first_line(make) or _about(name)[1]
+    return command_taking(name, [*own, *shared], run, help=about, epilog=help_text_or_none(f"bench {name}"))
+
+
+def _shared(
     planner: Annotated[
-        str,
-        typer.Option(
-            help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or the baselines `idm`, `mobil`, `expert`."
-        ),
-    ] = "onboard",
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/lampilot-PLANNER.")] = None,
-    items: Annotated[int, typer.Option(min=0, help="How many items, drawn with --seed; 0 for all.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of that draw.")] = 42,
-    setting: Annotated[
-        str, typer.Option(help="Prompt for language models: `few-shot`, `zero-shot` or `human-feedback`.")
-    ] = "few-shot",
-    repository: Annotated[Path | None, typer.Option(help="Policy repository, for --setting human-feedback.")] = None,
-    rehearse: Annotated[
-        int, typer.Option(min=0, help="Try this many variants of each program on copies of the scene first.")
-    ] = 0,
-    shield: Annotated[
-        bool, typer.Option("--shield", help="Let the run-time shield have the last word; LaMPilot has none.")
-    ] = False,
-    metrics: MetricsOption = "origin",
+        str | None, typer.Option(help="Who is asked: a planner, `onboard` by default; of questions, a model.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; one begun there is continued.")] = None,
     base_url: BaseUrl = None,
     concurrency: Concurrency = 16,
     max_usd: MaxUsd = None,
@@ -89,103 +157,78 @@ def lampilot(
     shard: ShardPart = None,
     ray: RayCluster = None,
 ) -> None:
-    """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
-    from chauffeur.bench.kernel.shards import WHOLE, Shard
-    from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
-    from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
-    from chauffeur.bench.lampilot.scenes import annotated
-    from chauffeur.cli.console import stdout
-    from chauffeur.cli.parts import setting_named
-    from chauffeur.worlds.highway.dblv1 import load_dataset
-
-    console = stdout()
-    work = effort(workers, concurrency, max_usd, max_requests, price, ray)
-    part = WHOLE if shard is None else Shard.parse(shard, os.environ)
-    aid = aid_for(setting, repository, LAMPILOT_LIMITS)
-    prompt = HUMAN_FEEDBACK if aid is not None else setting_named(setting)
-    dataset, _ = annotated(load_dataset(data))
-    variant = (f"-rehearsed-{rehearse}" if rehearse else "") + ("-shielded" if shield else "")
-    folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}{variant}"
-    if part != WHOLE:
-        folder = folder / part.folder
-    asked = "" if aid is None else aid.id
-    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS, rehearse, asked, shield)
-    run = LampilotRun(folder, dataset, config, _planner(planner, base_url), shard=part, requests=aid)
-    rows = carry_out(console, run, lambda watch: run.run(watch, work, ruler=metrics), "LaMPilot-Bench")
-    _show(console, run, rows)
-    finish(console, run)
+    """Declare what every benchmark's command takes beside its own options."""
 
 
-@bench_app.command(epilog=PASSENGER_EXAMPLES, short_help="Hand-written wishes: driven, asked, or refused.")
-def passengers(
-    planner: Annotated[str, typer.Option(help="As for `bench lampilot`.")] = "onboard",
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
-    setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
-    base_url: BaseUrl = None,
-    concurrency: Concurrency = 16,
-    workers: Workers = None,
-) -> None:
-    """Hand-written wishes with the right outcome each: driven, asked back about, or refused."""
-    from chauffeur.bench.lampilot.runner import LampilotRun
-    from chauffeur.bench.passengers import as_dataset, requests_of, run_config
-    from chauffeur.cli.console import stdout
-    from chauffeur.cli.parts import setting_named
-
-    console = stdout()
-    prompt = setting_named(setting)
-    config = run_config(planner, prompt)
-    folder = out or Path("runs") / f"passengers-{planner.replace('/', '-')}"
-    run = LampilotRun(folder, as_dataset(), config, _planner(planner, base_url), requests=requests_of(prompt))
-    work = effort(workers, concurrency)
-    rows = carry_out(console, run, lambda watch: run.run(watch, work), "Wishes of passengers")
-    _show(console, run, rows)
-    finish(console, run)
+_BUDGET: Final = ("max_usd", "max_requests", "price")
+_OF_ASKING: Final = frozenset({"planner", "base_url", "concurrency", *_BUDGET})
 
 
-def _planner(spec: str, base_url: str | None) -> Planner | None:
-    """Who plans; None for the baselines."""
-    from chauffeur.bench.lampilot.rollout import BASELINES
-    from chauffeur.planners.registry import make_planner
-
-    return None if spec in BASELINES else make_planner(spec, **planner_options(spec, base_url))
+def _first_line(make: Any) -> str:
+    return (inspect.getdoc(make) or "").partition("\n\n")[0]
 
 
-def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
-    from chauffeur.bench.kernel.report import tables
-    from chauffeur.bench.lampilot.report import FAMILY_TABLE, SCORE_TABLE
-    from chauffeur.version import __version__
-
-    rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
-    if not rated:
-        return
-    if len(rated) < len(rows):
-        console.print(f"Partial: the {len(rated)} of {len(rows)} items that were asked.")
-    planner = run.config.planner if len(run.config.planner) <= _NAME else f"...{run.config.planner[3 - _NAME :]}"
-    show_tables(console, tables((FAMILY_TABLE, SCORE_TABLE), rated, planner))
-    model = f", model {run.manifest.model}" if run.manifest.model else ""
-    labels = "".join(f"; {label}" for label in run.manifest.labels)
-    console.print(
-        f"Chauffeur {__version__}; planner {run.config.planner}{model}{labels}; "
-        f"metrics {rows[0]['metrics']}; data sha256 {run.config.data_sha256[:12]}; draw seed {run.config.seed}; limits "
-        f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
-        "are its authors' own figures."
-    )
+def asks(make: Any) -> bool:
+    """True if a planner or model is asked, as far as the class tells: that of the result, where a function makes it."""
+    kind = make if isinstance(make, type) else get_type_hints(make).get("return") if callable(make) else type(make)
+    told = not isinstance(make, type) and "planner" in inspect.signature(make).parameters
+    return bool(getattr(kind, "asks", "plans")) or told
 
 
-@bench_app.command(epilog=MERGE_EXAMPLES, short_help="Put shards of a LaMPilot-Bench run together.")
+bench_app = typer.Typer(
+    cls=BenchGroup,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Run a benchmark of the field. Results are simulated drives.",
+)
+
+
+@bench_app.callback()
+def bench() -> None:
+    """Benchmarks."""
+
+
+@bench_app.command(short_help="Put the shards of a run together.")
 def merge(
     out: Annotated[Path, typer.Argument(help="Folder for the whole run.")],
     shards: Annotated[list[Path], typer.Argument(help="Folders of all its shards.")],
-    metrics: MetricsOption = "origin",
+    option: BenchOptions = None,
 ) -> None:
-    """Put the shards of a LaMPilot-Bench run together, and score it as if it had been one."""
-    from chauffeur.bench.kernel.report import tables
-    from chauffeur.bench.lampilot.merge import merge_shards
-    from chauffeur.bench.lampilot.report import FAMILY_TABLE
-    from chauffeur.cli.console import stdout
+    """Put the shards of a run together, and score it as if it had been one.
 
-    console = stdout()
-    rows = merge_shards(out, shards, metrics)
-    show_tables(console, tables((FAMILY_TABLE,), rows))
-    console.print(f"{len(rows)} items of {len(shards)} shards, metrics {rows[0]['metrics']}.")
-    console.print(f"Rows: {out / 'results.jsonl'}", soft_wrap=True)
+    The benchmark is made again by the options that the shards were begun with; -o says what differs, e.g. where its
+    data are now.
+    """
+    from chauffeur.bench.kernel.merge import made_of
+
+    name, options = made_of(shards[0])
+    make = load_plugin(GROUP, name)
+    merge_folders(out, shards, name, make, _typed(make, {**options, **named_values(option or [])}))
+
+
+def _typed(make: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Stored options as the benchmark's command would have read them, what is not given by its default.
+
+    Raises:
+        ConfigError: There is none of that name.
+        UsageError: One has a value that it cannot have.
+    """
+    found: dict[str, Any] = {}
+
+    def take(**read: Any) -> None:
+        found.update(read)
+
+    own = options_of(make)
+    if strange := given.keys() - {one.name for one in own}:
+        raise ConfigError(
+            f"The benchmark has no option {min(strange)!r}.", hint=f"It has: {', '.join(one.name for one in own)}."
+        )
+    command, line = command_taking("merge", own, take), list[str]()
+    for one in command.params:
+        value = given.get(one.name)
+        if isinstance(value, bool):
+            line += one.opts[:1] if value else one.secondary_opts[:1]
+        elif value is not None:
+            line += [one.opts[0], str(value)]
+    command.main(line, standalone_mode=False)
+    return found

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
 if TYPE_CHECKING:
@@ -15,64 +15,113 @@ if TYPE_CHECKING:
 
     from chauffeur.bench.lampilot.coaching import Coached
     from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
-
-EXAMPLES = help_text("coach")
+    from chauffeur.bench.leaderboard.coaching import TownLesson
+    from chauffeur.bench.leaderboard.routes import LeaderboardRoute
+    from chauffeur.memory.policies import PolicyRepository
 
 
 _DEMO = "demo12"
 
 
 def coach(
-    data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
-    planner: Annotated[str, typer.Option(help="The model, e.g. `openai/<model>`.")],
     repository: Annotated[Path, typer.Option(help="Folder of the policy repository; made if there is none.")],
+    data: Annotated[Path | None, typer.Option(help="LaMPilot's DbLv1 folder, to learn on its items.")] = None,
+    routes: Annotated[str, typer.Option(help="Route file (XML), or `own`, to learn in towns.")] = "",
+    planner: Annotated[
+        str, typer.Option(help="The model, e.g. `openai/<model>`; in towns also `apprentice`, the default there.")
+    ] = "",
     critic: Annotated[
-        str, typer.Option(help="`person` at this terminal, or `evaluator`: the benchmark's verdict in words.")
-    ] = "person",
+        str,
+        typer.Option(help="`person` at this terminal, or `evaluator`: the benchmark's verdict in words."),
+    ] = "",
     ids: Annotated[
         str,
         typer.Option(help="Items by id, with commas; `demo12` for the twelve LaMPilot's own model was coached on."),
     ] = "",
-    rounds: Annotated[int, typer.Option(min=1, max=50, help="Attempts at most for each item.")] = 5,
+    rounds: Annotated[int, typer.Option(min=1, max=50, help="Attempts at most for each item or lesson.")] = 5,
+    lessons: Annotated[int, typer.Option(min=1, help="In towns: programs that the repository shall hold.")] = 50,
+    towns: Annotated[str, typer.Option(help="Only these towns, with commas between.")] = "",
+    seed: Annotated[int, typer.Option(help="In towns: of traffic, and of the words of instructions.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the attempts; default `runs/coach-<planner>`.")] = None,
     base_url: BaseUrl = None,
 ) -> None:
-    """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
-    from chauffeur.bench.kernel.store import RowStore
-    from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
-    from chauffeur.cli.console import path_text, plain, stdout
-    from chauffeur.cli.failures import FAILED
+    """Human feedback (paper Tab. IV, V): drive, say what was wrong, drive again; what did well is kept."""
+    from chauffeur.cli.console import plain, stdout
+    from chauffeur.cli.interrupts import stopped_kindly
     from chauffeur.cli.parts import planner_named
-    from chauffeur.concept import LAMPILOT_LIMITS
+    from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits
     from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
-    from chauffeur.worlds.highway.dblv1 import load_dataset
 
     console = stdout()
-    judge = _critic(critic, console)
+    if (data is None) == (not routes):
+        raise ConfigError("It learns on LaMPilot's items, or in towns.", hint="Give --data DIR, or --routes own.")
+    if data is None:
+        from chauffeur.bench.leaderboard.coaching import Apprentice, TownCoach
+
+        if critic == "person" or ids or out is not None:
+            raise ConfigError("In towns the evaluator judges lessons.", hint="Leave out --critic, --ids and --out.")
+        ways = _ways(routes, {town for town in towns.split(",") if town})
+        who = Apprentice() if planner in ("", "apprentice") else planner_named(planner, base_url)
+        kept_in = PolicyRepository(repository, create=True)
+        said = f"Coaching {who.id} on {len(ways)} routes; {CRITIC_LABELS['evaluator']}; simulated drives."
+        console.print(plain(said))
+        with stopped_kindly(console, repository):
+            TownCoach(who, kept_in, Limits(), seed, rounds, partial(_told, console)).coach(ways, lessons)
+        console.print(plain(f"{len(kept_in.entries)} programs in {repository}."))
+        return
+    from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named
+    from chauffeur.worlds.highway.dblv1 import load_dataset
+
+    if not planner:
+        raise ConfigError("Nobody is coached.", hint="Name a model with --planner, e.g. openai/gpt-4o.")
+    judge = _critic(critic or "person", console)
     wanted = items_named(load_dataset(data), _ids(ids, DEMO_ITEMS))
     folder = out or Path("runs") / f"coach-{planner.replace('/', '-')}"
     kept_in = PolicyRepository(repository, create=True)
-    teller = _Teller(console, folder / "drives" if critic == "person" else None)
-    console.print(
-        plain(f"Coaching {planner} on {len(wanted)} items; {CRITIC_LABELS[judge.judge_id]}; simulated drives.")
-    )
-    coaching = Coach(
-        folder, planner_named(planner, base_url), kept_in, judge, LAMPILOT_LIMITS, rounds=rounds, tell=teller.tell
-    )
-    again = f"What is done is kept in {folder} and {repository}; run the same command to go on."
-    try:
-        done = coaching.coach(wanted)
-    except KeyboardInterrupt:
-        console.print(plain(f"\nStopped. {again}"))
-        raise typer.Exit(130) from None
-    _table(console, done)
+    tell = _Teller(console, folder / "drives" if judge.judge_id == "person" else None).tell
+    who = planner_named(planner, base_url)
+    said = f"Coaching {planner} on {len(wanted)} items; {CRITIC_LABELS[judge.judge_id]}; simulated drives."
+    console.print(plain(said))
+    with stopped_kindly(console, folder, repository):
+        done = Coach(folder, who, kept_in, judge, LAMPILOT_LIMITS, rounds=rounds, tell=tell).coach(wanted)
+    _sum_up(console, folder, kept_in, done, len(wanted))
+
+
+def _ways(routes: str, towns: set[str]) -> list[LeaderboardRoute]:
+    from chauffeur.bench.leaderboard.own_routes import own_routes
+    from chauffeur.bench.leaderboard.routes import read_routes
+
+    file = own_routes()[0] if routes == "own" else read_routes(Path(routes))
+    return [one for one in file.routes if not towns or one.town in towns]
+
+
+def _told(console: Console, one: TownLesson) -> None:
+    from chauffeur.cli.console import plain
+
+    end = f"kept as {one.kept}" if one.kept else f"not kept: {one.words}"
+    console.print(plain(f"{one.lesson.id} {one.lesson.said.text} {one.attempts} attempts, {end}"), soft_wrap=True)
+
+
+def _sum_up(console: Console, folder: Path, kept_in: PolicyRepository, done: tuple[Coached, ...], wanted: int) -> None:
+    """What came of the items, and what it cost. Raises Exit: of one no attempt could be made."""
+    from chauffeur.bench.kernel.store import RowStore
+    from chauffeur.bench.lampilot.coaching import spent
+    from chauffeur.cli.console import path_text, plain
+    from chauffeur.cli.failures import FAILED
+    from chauffeur.cli.lab.tables import show_table
+
+    lines = [(one.item, _ENDINGS[one.ending], plain(one.kept).plain, str(one.rounds)) for one in done]
+    console.print()
+    show_table(console, "Coached items", ("item", "ending", "program", "rounds"), lines)
     usage = spent(RowStore(folder / "coaching.jsonl", "key").rows.values())
     tokens = usage.prompt_tokens + usage.completion_tokens
     price = "" if usage.cost_usd is None else f", {usage.cost_usd:.4f} USD"
     console.print(plain(f"{usage.requests} requests and {tokens} tokens in this folder so far{price}."))
-    console.print(path_text(repository), plain(f"holds {len(kept_in.entries)} programs; {'; '.join(kept_in.labels)}"))
-    if len(done) < len(wanted):
-        console.print(plain(f"Stopped after {len(done)} of {len(wanted)} items. {again}"))
+    labels = "; ".join(kept_in.labels)
+    console.print(path_text(kept_in.folder), plain(f"holds {len(kept_in.entries)} programs; {labels}"))
+    if len(done) < wanted:
+        kept = f"What is done is kept in {folder} and {kept_in.folder}; run the same command to go on."
+        console.print(plain(f"Stopped after {len(done)} of {wanted} items. {kept}"))
     if any(one.ending == "failed" for one in done):
         raise typer.Exit(FAILED)
 
@@ -223,17 +272,3 @@ _ENDINGS = {
     "given_up": "given up after all rounds",
     "failed": "no attempt could be made",
 }
-
-
-def _table(console: Console, done: tuple[Coached, ...]) -> None:
-    from rich.table import Table
-
-    from chauffeur.cli.console import plain
-
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), title="Coached items", title_justify="left")
-    for name in ("item", "rounds", "ending", "program"):
-        table.add_column(name, justify="right" if name == "rounds" else "left")
-    for one in done:
-        table.add_row(one.item, str(one.rounds), _ENDINGS[one.ending], plain(one.kept))
-    console.print()
-    console.print(table)

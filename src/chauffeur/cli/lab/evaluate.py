@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from chauffeur.cli.examples import help_text
 from chauffeur.cli.lab.bench_run import UNFINISHED, effort
 from chauffeur.cli.options import BaseUrl, BenchOptions, Concurrency, MaxRequests, MaxUsd, Price, Workers
 from chauffeur.cli.parts import planner_options
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from chauffeur.bench.evaluation.parts import PlannedPart, Profile
     from chauffeur.bench.kernel.pipeline import Watch
     from chauffeur.bench.kernel.run import BenchRun
-
-EXAMPLES = help_text("evaluate")
 
 
 def evaluate(
@@ -59,7 +56,7 @@ def evaluate(
     folder = out or Path("runs") / f"evaluate-{name}-{profile}"
     evaluation = Evaluation(who, folder, cast("Profile", profile), _options(option or []), benchmarks or ())
     runs = sum(one.benchmark is not None for one in evaluation.parts)
-    console.print(f"{who.made.id}, profile {profile}: {runs} benchmarks, folder {folder}", soft_wrap=True)
+    console.print(f"{who.made.id}, profile {profile}, benchmarks to run: {runs}; folder {folder}", soft_wrap=True)
     try:
         card = evaluation.run(lambda part, run: _shown(console, part, run), work)
     except KeyboardInterrupt:
@@ -69,7 +66,8 @@ def evaluate(
     console.print(f"Card: {folder / 'card.json'}, {folder / 'card.md'}", soft_wrap=True)
     if any(one.state == "partial" for one in card.entries):
         raise typer.Exit(UNFINISHED)
-    if any(one.state == "failed" for one in card.entries):
+    named = [one for one in card.entries if one.name in (benchmarks or ())]
+    if any(one.state == "failed" for one in card.entries) or any(one.state == "not run" for one in named):
         raise typer.Exit(FAILED)
 
 
@@ -87,11 +85,11 @@ def _shown(console: Console, part: PlannedPart, run: BenchRun) -> Generator[Watc
 
 def _options(given: list[str]) -> dict[str, dict[str, Any]]:
     """Options of benchmarks, `NAME.OPTION=VALUE`, by benchmark. Raises ConfigError."""
-    from chauffeur.cli.check import read_options
+    from chauffeur.cli.parts import named_values
     from chauffeur.concept import ConfigError
 
     found: dict[str, dict[str, Any]] = {}
-    for name, value in read_options(given).items():
+    for name, value in named_values(given).items():
         bench, dot, own = name.partition(".")
         if not dot or not own:
             raise ConfigError(f"{name!r} names no benchmark.", hint="Write -o BENCHMARK.NAME=VALUE.")

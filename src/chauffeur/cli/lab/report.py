@@ -7,10 +7,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
-EXAMPLES = help_text("report")
-
 
 def report(
     runs: Annotated[
@@ -46,8 +42,8 @@ def report(
     from chauffeur.cli.console import columns, path_text, plain, stdout
     from chauffeur.cli.lab.bench_run import show_tables
     from chauffeur.cli.lab.view import progress, write_page_of
-    from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
+    from chauffeur.concept.needs import needs
     from chauffeur.driving.files import publish
 
     if inspect is not None and len(runs) != 1:

@@ -22,6 +22,7 @@ def show_card(console: Console, card: ScoreCard) -> None:
     from rich.text import Text
 
     from chauffeur.bench.evaluation.card import PAPER_NOTE, head_text, paper_texts
+    from chauffeur.bench.evaluation.parts import LEFT_OUT
 
     lines: list[list[str]] = []
     for entry in card.ran:
@@ -40,12 +41,15 @@ def show_card(console: Console, card: ScoreCard) -> None:
         console.print("\nPaper", style="bold")
         console.print(columns(printed))
         console.print(PAPER_NOTE, style="dim")
-    missing = [one for one in card.entries if one.state != "done"]
+    missing = [one for one in card.entries if one.state != "done" and one.why != LEFT_OUT]
     if missing:
         console.print("\nNot run, or not whole", style="bold")
         console.print(
             columns((one.name, plain(f"{_state(one.state)}{one.why} {one.remedy}".rstrip())) for one in missing)
         )
+
+    if left := [one.name for one in card.entries if one.why == LEFT_OUT]:
+        console.print(f"\nLeft out: {', '.join(left)}.", style="dim")
 
 
 def _state(state: str) -> str:

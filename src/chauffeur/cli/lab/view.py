@@ -9,14 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import help_text
-
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.viewer.content import Content
-
-EXAMPLES = help_text("view")
 
 _USUAL: Final = (Path("runs"), Path("trips"))
 

@@ -1,7 +1,8 @@
 """Instructions in a town, on board: what is meant is learned, the ways to drive it are too, and the map decides.
 
-The programs were learned on training routes by the feedback loop (`chauffeur bench coach-town`) and ship with the
-package; what is recalled is checked against the junction ahead; a way or lane that is not there is refused in words.
+The programs were learned on training routes by the feedback loop (`chauffeur bench coach --routes own`) and ship with
+the package; what is recalled is checked against the junction ahead; a way or lane that is not there is refused in
+words.
 """
 
 from __future__ import annotations
