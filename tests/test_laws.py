@@ -128,6 +128,7 @@ REQUESTS_MADE = {
     "driving/planning.py",  # for drives and benchmarks, screened
     "bench/hostile/requests.py",  # what screening is worth is measured without it, too
     "bench/lampilot/shown.py",  # of a trip that is filed; nobody is asked
+    "driving/trips.py",  # the same
     "models/vlm/lora.py",  # of a training pair; nobody is asked
 }
 """Modules that may name the request of a planner as something to be made."""
@@ -166,15 +167,13 @@ OTHER_TEXT = {
     "safety/faithfulness/comparison.py": "thoughts of a planner",
 }
 READS_WORDS = {
-    "cli/talk_drive.py": "leave is taken of a session: a closed class of words",
-    "cli/vehicle_desk.py": "leave is taken of a session: a closed class of words",
     "describe/answers.py": "what a question is about; acts say only that it is one",
+    "driving/drive_session.py": "leave is taken of a session: a closed class of words",
     "driving/live/plan_messages.py": "what is said aside, until the session holds an utterance",
     "driving/onroad/checks.py": "to engage the vehicle is no act, and never done",
     "driving/onroad/session.py": "what is said aside, until the session holds an utterance",
     "driving/planning.py": "what is a question, until the request holds an utterance",
     "driving/scenarios.py": "whether a wish is one that a scenario is listed with",
-    "driving/talk/session.py": "leave is taken of a session: a closed class of words",
     "memory/conflicts.py": "numbers to keep and numbers to change by, until acts are read as well",
     "memory/feedback.py": "opinions, until acts of feedback are read as well",
     "memory/phrases.py": "opinions, until acts of feedback are read as well",

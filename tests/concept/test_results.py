@@ -13,18 +13,18 @@ from chauffeur.concept import (
     History,
     Instruction,
     Outcome,
-    Part,
     Plan,
     Program,
     Thoughts,
     Trip,
     Verdict,
+    WishPart,
     result_of,
 )
 from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import people_speed
 
-DONE, MISSED = Part("done", "turn left"), Part("not_done", "stop", "the car did not come to a stand")
+DONE, MISSED = WishPart("done", "turn left"), WishPart("not_done", "stop", "the car did not come to a stand")
 
 
 def trip(outcome: Outcome, **changes: Any) -> Trip:
@@ -43,7 +43,7 @@ def undriven(intent: str, offer: str = "") -> Trip:
         (trip("success"), "done"),
         (trip("success", unused=("when it rains",)), "partly done"),
         (trip("ended"), "done"),
-        (trip("success", parts=(DONE, Part("not_judged", "wait"))), "partly done"),
+        (trip("success", parts=(DONE, WishPart("not_judged", "wait"))), "partly done"),
         (trip("ended", unused=("and wait",)), "partly done"),
         (trip("ended", plan=Plan(Thoughts(""), Program(""))), "partly done"),
         (trip("timeout", parts=(MISSED, MISSED)), "not done"),

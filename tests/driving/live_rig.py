@@ -7,7 +7,7 @@ from pathlib import Path
 
 from live_bench import OVERTAKE, Bench
 
-from chauffeur.concept import Plan, Policy, Program, Thoughts
+from chauffeur.concept import Plan, Policy, Program, Thoughts, Verdict
 from chauffeur.driving.events import DriveEvent
 from chauffeur.driving.live.messages import LiveSetpoints, MirroredInstant, Report
 from chauffeur.driving.live.mirror import Mirror
@@ -34,6 +34,7 @@ class Rig:
         self.bench.control.begin_trip()
         self.reports: list[Report] = []
         self._heard = Reader(self.events, old=True)
+        self.verdicts: list[Verdict] = []
 
     def new_policy(self) -> PolicyProcess:
         mirror = Mirror(self.bench.new_world().mirror(), self.starts, self.bench.observations)
@@ -70,7 +71,12 @@ class Rig:
         self.policy = self.new_policy()
 
     def told(self) -> list[DriveEvent]:
-        return [read_event(message.payload) for message in self._heard.news()[0]]
+        """What became of wishes since the last look; the verdicts of that time are in `verdicts`."""
+        events = [read_event(message.payload) for message in self._heard.news()[0]]
+        self.verdicts = [
+            one for event in events if isinstance(event.value, tuple) for one in event.value if isinstance(one, Verdict)
+        ]
+        return [event for event in events if event.kind != "verdicts"]
 
     def kinds(self) -> list[tuple[str, str]]:
         return [(event.kind, event.wish) for event in self.told()]

@@ -85,7 +85,8 @@ class Rig:
         return self.kinds()
 
     def told(self) -> list[DriveEvent]:
-        return [read_event(message.payload) for message in Reader(self.events, old=True).news()[0]]
+        events = [read_event(message.payload) for message in Reader(self.events, old=True).news()[0]]
+        return [event for event in events if event.kind != "verdicts"]  # the policy's tests look at those
 
     def kinds(self) -> list[tuple[str, str]]:
         return [(event.kind, event.wish) for event in self.told()]

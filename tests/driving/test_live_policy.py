@@ -76,6 +76,7 @@ def test_a_plan_is_checked_started_run_and_told_of(rig: Rig) -> None:
     assert (wish.plan, wish.state, wish.setpoints.target_speed_mps) == ("w1", "running", 20.0)
     assert wish.line is not None
     assert rig.kinds() == [("started", "w1")]
+    assert rig.verdicts and all(verdict.passed for verdict in rig.verdicts), "told, and before it started"
     assert rig.period(45).state == "finished"
     assert rig.kinds() == [("said", "w1"), ("finished", "w1")]
     assert rig.period().setpoints.target_speed_mps == 20.0  # what was wished holds on
@@ -90,6 +91,7 @@ def test_a_plan_that_crosses_the_limits_is_refused_and_what_is_driven_goes_on(ri
     assert (wish.plan, wish.setpoints.target_speed_mps) == ("w1", 20.0)
     kinds = rig.kinds()
     assert kinds == [("started", "w1"), ("refused", "w2")]
+    assert [verdict for verdict in rig.verdicts if verdict.stops], rig.verdicts
 
 
 def test_a_new_plan_takes_over_at_the_beginning_of_a_period_with_the_wishes_of_the_old(rig: Rig) -> None:

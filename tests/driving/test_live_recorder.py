@@ -129,16 +129,16 @@ def test_a_drive_is_told_from_the_first_wish_to_the_last_command(driven: Path) -
     assert verify(driven).closed
     about = [(record.kind, record.body.get("wish")) for record in records(driven) if record.body.get("wish")]
     told = [kind for kind, wish in about if wish == "w1" and kind != "context"]
-    assert told == ["wish", "plan", "verdict", "outcome"]
+    assert list(dict.fromkeys(told)) == ["wish", "plan", "verdict", "outcome"]
     assert [kind for kind, wish in about if wish == "w2" and kind != "context"] == ["wish", "plan", "outcome"]
-    assert [kind for kind, wish in about if wish == "w3" and kind != "context"] == [
-        "wish", "plan", "verdict", "outcome",
-    ]  # fmt: skip
+    told = [kind for kind, wish in about if wish == "w3" and kind != "context"]
+    assert list(dict.fromkeys(told)) == ["wish", "plan", "verdict", "outcome"]
     outcomes = {record.body.get("wish", ""): record.body["outcome"] for record in records(driven, "outcome")}
     assert outcomes == {"w1": "finished", "w2": "declined", "w3": "refused", "": "stopped"}
     results = [record.body["result"] for record in records(driven, "outcome") if record.body.get("wish")]
     assert results == ["done", "declined", "declined"]
-    assert [record.body["passed"] for record in records(driven, "verdict")] == [True, False]
+    judged = {(each.body["wish"], each.body["check"]): each.body["passed"] for each in records(driven, "verdict")}
+    assert judged["w1", "format-v1"] and not judged["w3", "parameters-v1"], "the checks that decided"
     assert unanswered(driven) == ()
 
 
@@ -172,7 +172,7 @@ def test_the_words_are_there_and_can_be_erased(driven: Path, tmp_path: Path) -> 
     assert texts["plan", "w1"]["program"] == PROGRAM
     assert texts["plan", "w1"]["thoughts"] == "Zebedee hurries."
     assert texts["plan", "w2"]["refusal"] == texts["outcome", "w2"]["detail"] == "A car cannot fly, Zebedee."
-    assert texts["verdict", "w3"]["reason"]
+    assert any(words_of(each).get("reason") for each in records(driven, "verdict") if not each.body["passed"])
     said = [words_of(each)["text"] for each in records(driven, "context") if each.body.get("event") == "said"]
     assert said == ["Driving on, Zebedee."]
     copy = tmp_path / "copy.jsonl"

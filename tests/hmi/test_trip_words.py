@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from sample_trips import doubted, highway_trip, refused_trip
 
-from chauffeur.concept import ActionMatrix, Causes, Parameters, Part, Plan, Program, Thoughts, Trip
+from chauffeur.concept import ActionMatrix, Causes, Parameters, Plan, Program, Thoughts, Trip, WishPart
 from chauffeur.concept.utterance import Act
 from chauffeur.hmi.words import account_words, trip_words
 
 DRIVEN = highway_trip(seconds=1.0).trip
-LEFT, STOP = Part("done", "turn left"), Part("not_done", "stop behind the bus", "the car stood elsewhere")
-WAIT = Part("not_judged", "wait for me", "no predicate knows this")
+LEFT, STOP = WishPart("done", "turn left"), WishPart("not_done", "stop behind the bus", "the car stood elsewhere")
+WAIT = WishPart("not_judged", "wait for me", "no predicate knows this")
 
 
 def driven(**changes: Any) -> Trip:
@@ -97,13 +97,13 @@ def test_a_word_and_a_sentence(trip: Trip, headline: str, account: str) -> None:
     ],
 )
 def test_a_plan_that_leads_to_a_place_is_told_by_the_place(plan: Plan, understood: str) -> None:
-    assert account_words(driven(plan=plan, parts=(Part("done"),))) == f"; I understood: {understood}; done."
-    missed = driven(plan=plan, parts=(Part("not_done", why="the car did not get there"),), outcome="timeout")
+    assert account_words(driven(plan=plan, parts=(WishPart("done"),))) == f"; I understood: {understood}; done."
+    missed = driven(plan=plan, parts=(WishPart("not_done", why="the car did not get there"),), outcome="timeout")
     assert f"; not done: {understood} (the car did not get there); " in account_words(missed)
 
 
 def test_speeds_are_in_the_persons_unit_and_an_explanation_that_is_not_so_takes_the_tick() -> None:
-    short = Part("not_done", "drive at 50 mph", "the car drove at 20.1 m/s")
+    short = WishPart("not_done", "drive at 50 mph", "the car drove at 20.1 m/s")
     wish = replace(DRIVEN.instruction, text="Drive at 50 mph.")
     assert "(the car drove at 45 mph)" in account_words(driven(instruction=wish, parts=(short,), outcome="failure"))
     assert trip_words(doubted(highway_trip(seconds=1.0)).trip)[:2] == ("≠", "Done, not as explained")

@@ -14,8 +14,6 @@ from chauffeur.cli.talk_typed import read_line
 from chauffeur.driving.live.plan_messages import TOOK_OVER
 from chauffeur.driving.talk.messages import Conversation, Said, Say, Stop
 from chauffeur.driving.talk.session import Talk
-from chauffeur.language.emergency import read_emergency
-from chauffeur.language.questions import ends_session
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
@@ -124,7 +122,7 @@ class TalkDrive:
     def _hand_on(self, session: Talk) -> None:
         line = self._given.pop(0)
         told = read_line(line, taken_over=session.taken_over)
-        at_once = not isinstance(told, Say) or read_emergency(told.text) is not None or ends_session(told.text)
+        at_once = not isinstance(told, Say) or session.enter(told.text).way != "wish"
         self._handed_on += not at_once
         self._line(session, line)
 

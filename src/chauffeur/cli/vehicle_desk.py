@@ -18,7 +18,6 @@ from chauffeur.driving.talk.sound import Sound
 from chauffeur.driving.talk.voice import Voice
 from chauffeur.driving.talk.wish_queue import Words
 from chauffeur.language.meaning.turns import answer_in
-from chauffeur.language.questions import ends_session
 
 _EVALUATE: Final = "evaluate"
 _LISTEN_S: Final = 0.2
@@ -46,7 +45,7 @@ class Desk:
 
     async def take(self, line: str, spoken: Words | None = None) -> None:
         """One line: a wish, what the person says of the drive, or that they leave."""
-        if ends_session(line):
+        if self._leaves(line):
             self.left = True
             self._screen.say(self._road.leaving)
             return
@@ -68,8 +67,11 @@ class Desk:
                     if self.left or not line.strip() or self._answered(line):
                         continue
                     task = self._start(self.take(line))
-                    if not lines.terminal or ends_session(line):
+                    if not lines.terminal or self._leaves(line):
                         await task
+
+    def _leaves(self, line: str) -> bool:
+        return self._road.enter(line).way == "leave"
 
     def _deaf(self, why: str) -> None:
         """Nobody listens any more; who cannot type either has nothing to wait for."""

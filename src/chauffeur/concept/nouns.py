@@ -632,7 +632,7 @@ PartResult = Literal["done", "not_done", "opposite", "not_judged"]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class WishPart:
     """A thing asked for and what became of it.
 
     Attributes:
@@ -717,7 +717,7 @@ class Trip:
     said: tuple[tuple[float, str], ...] = ()
     record: tuple[tuple[str, Any], ...] = ()
     unused: tuple[str, ...] = ()
-    parts: tuple[Part, ...] = ()
+    parts: tuple[WishPart, ...] = ()
     judged_by: JudgedBy | Literal[""] = ""
 
     @property

@@ -10,8 +10,9 @@ from itertools import zip_longest
 from typing import Any, Final
 
 from chauffeur.concept import Frame, Limits, Verdict
+from chauffeur.driving.episode import make_world
 from chauffeur.driving.recording import Difference, RecordedTrip
-from chauffeur.driving.session import provenance
+from chauffeur.driving.trips import provenance
 from chauffeur.safety.shield import SHIELD_VERSION
 
 APART_M: Final = 0.1
@@ -133,7 +134,9 @@ def _relative(difference: Difference) -> float | None:
 def _changed(recorded: RecordedTrip) -> Iterator[str]:
     trip = recorded.trip
     then = dict(trip.record)
-    now = {**dict(provenance(trip.plan, recorded.scenario, trip.seed, Limits())), "shield": SHIELD_VERSION}
+    scenario = recorded.scenario
+    today = provenance(trip.plan, scenario, trip.seed, Limits(), make_world(scenario).engine)
+    now = {**dict(today), "shield": SHIELD_VERSION}
     for name, said in _NAMED.items():
         if name in then and then[name] != now[name]:
             yield f"Recorded with {said} {then[name]}; now {now[name]}."

@@ -24,13 +24,13 @@ from chauffeur.concept import (
     Metric,
     Observation,
     Outcome,
-    Part,
     Policy,
     Program,
     ProgramState,
     SandboxError,
     Scenario,
     Setpoints,
+    WishPart,
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.driving.actuate import actuate, set_points
@@ -93,7 +93,7 @@ class TellsParts(Protocol):
     """What a referee offers that judges a wish part by part."""
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[WishPart, ...]:
         """The things asked for and what became of each so far."""
         ...
 
@@ -132,7 +132,7 @@ class Episode:
     success: bool
     interventions: int = 0
     bounded: tuple[tuple[str, int], ...] = ()
-    parts: tuple[Part, ...] = ()
+    parts: tuple[WishPart, ...] = ()
     judged_by: JudgedBy | Literal[""] = ""
 
 
@@ -375,11 +375,11 @@ def run_episode(
     )
 
 
-def _parts(referee: Referee | None, *, success: bool) -> tuple[Part, ...]:
+def _parts(referee: Referee | None, *, success: bool) -> tuple[WishPart, ...]:
     """The things asked for and what became of each; of a judge that knows one goal, that."""
     if isinstance(referee, TellsParts):
         return referee.parts
-    return () if referee is None else (Part("done" if success else "not_done"),)
+    return () if referee is None else (WishPart("done" if success else "not_done"),)
 
 
 def _ask(policy: RunningPolicy | None, held: Setpoints) -> PolicyTick:

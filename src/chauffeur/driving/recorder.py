@@ -51,7 +51,7 @@ from chauffeur.driving.live.messages import FallbackLevel, LiveEnd, Report
 from chauffeur.driving.live.settings import Settings
 from chauffeur.driving.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.trips import LIVE_CHECK, scenario_hash
+from chauffeur.driving.trips import scenario_hash
 from chauffeur.safety.audit.entries import Kind
 from chauffeur.safety.audit.keys import read_key
 from chauffeur.safety.audit.reader import read_records
@@ -75,7 +75,8 @@ _GUARDED: Final[dict[EventKind, Kind]] = {
 """Kind of record that is lost where one of an event cannot be made."""
 _DRIVEN: Final[frozenset[FallbackLevel]] = frozenset({"follow", "hold"})
 """Between these the level goes up and down without anything being let go of."""
-_WRITTEN_WITH_THE_PLAN: Final[frozenset[EventKind]] = frozenset({"planned", "declined", "answered"})
+_WRITTEN_ELSEWHERE: Final[frozenset[EventKind]] = frozenset({"planned", "declined", "answered"})
+"""They say what the plan says, which has been written down."""
 
 _log = logging.getLogger(__name__)
 
@@ -213,12 +214,7 @@ class DriveRecorder:
     def _became(self, event: DriveEvent) -> None:
         """What became of a wish in real time, or of one that was never asked."""
         at = {"wish": event.wish, "tick": self._live.tick}
-        judged = event.kind in ("started", "refused") or (event.kind == "stale" and not event.final)
-        if judged:  # a stale plan is told of once as it comes, and once more if that is the last word
-            why = "" if event.kind == "started" else event.text
-            body = at | {"check": LIVE_CHECK, "passed": not why, "line": None}
-            self._personal("verdict", event.wish, body, {"reason": why})
-        elif not event.final and event.kind not in _WRITTEN_WITH_THE_PLAN:
+        if not event.final and event.kind not in _WRITTEN_ELSEWHERE:
             self._personal("context", event.wish, at | {"event": event.kind}, {"text": event.text})
         if event.final:
             self._open_wish = self._open_wish and bool(event.wish)

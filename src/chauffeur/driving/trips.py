@@ -27,7 +27,6 @@ from chauffeur.concept import (
     Scenario,
     SystemMessage,
     Trip,
-    Verdict,
 )
 from chauffeur.driving.emergency import not_checked
 from chauffeur.driving.episode import Episode, make_world
@@ -49,8 +48,6 @@ NO_METRICS: Final = (
     "The vehicle tells its speed and nothing of gaps, lanes or others: no time to collision, comfort or efficiency is "
     "given. How long it drove so is not known: the parameters stay in force until others are asked for."
 )
-LIVE_CHECK: Final = "live"
-"""Name of the judgement over all checks of a drive in real time, made when a plan is about to start."""
 
 _ENDED_BADLY: Final[dict[str, Outcome]] = {"collision": "collision", "off_road": "off_road"}
 _OF_EVENTS: Final[dict[EventKind, Outcome]] = {
@@ -108,7 +105,7 @@ def file_trip(
         scenario=scenario.id,
         seed=seed,
         said=said,
-        record=(*_provenance(plan, scenario, seed, request.limits, engine), *facts),
+        record=(*provenance(plan, scenario, seed, request.limits, engine), *facts),
         unused=() if outcome in ("refused", "not_driven") else unused_of(request.instruction.text, plan),
         parts=() if episode is None else episode.parts,
         judged_by="" if episode is None else episode.judged_by,
@@ -182,9 +179,8 @@ def live_trip(interaction: Interaction, start: Start, dt_s: float, last: Report 
     why = answer.text if outcome in ("refused", "failure") else ""
     failed = outcome == "failure"
     request = PlanRequest(brief.instruction, brief.context, SystemMessage(""), brief.history, limits=start.limits)
-    verdicts = (Verdict(LIVE_CHECK, passed=False, reason=why),) if answer.kind == "refused" else ()
     return file_trip(
-        Planned(brief.plan, verdicts, request),
+        Planned(brief.plan, interaction.verdicts, request),
         start.scenario,
         start.seed,
         outcome,
@@ -258,7 +254,7 @@ def _trip_id(instruction: Instruction, limits: Limits, plan: Plan, scenario: Sce
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 
-def _provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits, engine: str) -> Facts:
+def provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits, engine: str) -> Facts:
     """What a result must name to be repeated; a vehicle's drive cannot be."""
     repeats: Facts = (("scenario_sha256", scenario_hash(scenario)), ("seed", seed)) if engine else ()
     return (

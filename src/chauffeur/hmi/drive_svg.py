@@ -1,22 +1,21 @@
 """A drive as a few small drawings from above, as SVG: sharp at any size, a few kilobytes, coloured by style sheet.
 
-The moments are chosen, framed and turned as in the filmstrip. Numbers go in as numbers and words are escaped, so
-nothing a person or a model wrote is ever markup.
+The moments are chosen, framed and turned as in the filmstrip.
 """
 
 from __future__ import annotations
 
 import html
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chauffeur.concept import Observation, VehicleState
+from chauffeur.concept import Observation
 from chauffeur.concept.units import kmh, people_speed
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.filmstrip import choose_moments
-from chauffeur.hmi.road import Bounds, PaintedRoad, draw_road, track_box
+from chauffeur.hmi.road import Bounds, draw_road, track_box
+from chauffeur.hmi.stills import road_shapes, scene_shapes, svg_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 MOMENTS = 6
@@ -25,25 +24,14 @@ _WIDTH_M = 120.0
 _EGO_PLACE = 0.4
 _BESIDE_M = 2.5
 _AROUND_M = 12.0
-_TRAIL_EVERY = 5
 _STANDING_MPS = 0.3
 _PIXELS_A_METRE = 4.5
 """Of a lengthwise picture: where there is less room it shows a shorter stretch, not smaller cars."""
-_CAR_M = (5.0, 2.0)
-"""Size of the body drawn once and used for every car; others are scaled."""
 _AHEAD_M = 100.0
 """Vehicles further ahead are not led by."""
 _LED_SHARE = 0.4
 """Least share of a drive with a vehicle ahead for the gap to be charted."""
 _CHART = (600.0, 60.0)
-
-SYMBOLS = (
-    '<svg class="symbols" width="0" height="0" aria-hidden="true"><defs>'
-    '<g id="car"><rect class="body" x="-2.5" y="-1" width="5" height="2" rx=".5"/>'
-    '<path class="glass" d="M.4-.75 1.3-.68V.68L.4.75zM-1.8-.66l.5.04V.62l-.5.04z"/></g>'
-    "</defs></svg>"
-)
-"""What every strip of a page refers to; once a page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +92,7 @@ def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Dri
     chosen = choose_moments([shot.time_s for shot in shots], events_of(recorded), moments)
     path = tuple((shot.ego.x_m, shot.ego.y_m) for shot in shots)
     seen = track_box(path).grown(_WIDTH_M if camera.along else 3 * _AROUND_M)
-    road = _road(draw_road(shots[0].road, shots[0].objects, seen))
+    road = svg_of(road_shapes(draw_road(shots[0].road, shots[0].objects, seen, shots[0].signs)))
     pictures: list[Picture] = []
     for moment in chosen:
         shot = shots[moment.index]
@@ -119,7 +107,7 @@ def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Dri
         caption = f"{shot.time_s:.1f} s, {'standing' if standing else people_speed(shot.ego.speed_mps)}"
         if moment.event is not None:
             caption += f" \N{EN DASH} {moment.event.label}"
-        moving = _trail(shots[: moment.index + 1]) + _bodies(shot, box)
+        moving = svg_of(scene_shapes(shots[: moment.index + 1], box.grown(5.0)))
         pictures.append(Picture(shot.time_s, caption, _svg(box, ground + moving, caption, lengthwise=camera.along)))
     return DrivePictures(camera.along, tuple(pictures), _charts(shots, [p.time_s for p in pictures]))
 
@@ -131,68 +119,6 @@ def _svg(box: Bounds, content: str, label: str, *, lengthwise: bool) -> str:
         f'<svg viewBox="{box.x0:.1f} {box.y0:.1f} {width:.1f} {height:.1f}"{size} role="img" '
         f'aria-label="From above: {html.escape(label)}">{content}</svg>'
     )
-
-
-def _road(road: PaintedRoad) -> str:
-    parts: list[str] = []
-    for extra, look in ((3.0, "verge"), (0.8, "edge"), (0.06, "asphalt")):
-        parts.extend(
-            f'<polyline class="r-{look}" stroke-width="{surface.width_m + extra:.2f}" '
-            f'points="{_points(surface.centre_m)}"/>'
-            for surface in road.surfaces
-        )
-    parts.extend(
-        f'<polyline class="r-emergency" stroke-width="{surface.width_m:.2f}" points="{_points(surface.centre_m)}"/>'
-        for surface in road.surfaces
-        if surface.emergency
-    )
-    parts.extend(f'<polyline class="r-paint r-{line.style}" points="{_points(line.points_m)}"/>' for line in road.lines)
-    parts.extend(f'<polyline class="r-paint r-bar" points="{_points(bar)}"/>' for bar in road.bars_m)
-    for sign in road.signs:
-        if sign.kind != "stop" or sign.line_m is None:
-            continue
-        parts.append(f'<polyline class="r-stop-line" points="{_points(sign.line_m)}"/>')
-        corners = [math.pi / 8 + i * math.pi / 4 for i in range(8)]
-        x, y = sign.post_m
-        octagon = tuple((x + 1.6 * math.cos(a), y + 1.6 * math.sin(a)) for a in corners)
-        parts.append(f'<polygon class="r-stop-sign" points="{_points(octagon)}"/>')
-    return "".join(parts)
-
-
-def _trail(so_far: Sequence[Observation]) -> str:
-    kept = [*so_far[::_TRAIL_EVERY], so_far[-1]]
-    return f'<polyline class="r-trail" points="{_points([(shot.ego.x_m, shot.ego.y_m) for shot in kept])}"/>'
-
-
-def _bodies(shot: Observation, box: Bounds) -> str:
-    wide = box.grown(5.0)
-
-    def visible(body: VehicleState) -> bool:
-        return wide.x0 <= body.x_m <= wide.x1 and wide.y0 <= body.y_m <= wide.y1
-
-    parts = [_body(thing, "obstacle") for thing in shot.objects if thing.kind == "obstacle" and visible(thing)]
-    parts.extend(
-        f'<circle class="r-cone" cx="{thing.x_m:.1f}" cy="{thing.y_m:.1f}" r="0.5"/>'
-        for thing in shot.objects
-        if thing.kind == "static" and visible(thing)
-    )
-    parts.extend(_body(car, "crashed" if car.crashed else "other") for car in shot.others if visible(car))
-    parts.append(_body(shot.ego, "ego crashed" if shot.ego.crashed else "ego"))
-    return "".join(parts)
-
-
-def _body(body: VehicleState, look: str) -> str:
-    turn = math.degrees(body.heading_rad) % 360.0
-    place = f"translate({body.x_m:.1f} {body.y_m:.1f})"
-    if round(turn, 1) not in (0.0, 360.0):
-        place += f" rotate({turn:.1f})"
-    if (body.length_m, body.width_m) != _CAR_M:
-        place += f" scale({body.length_m / _CAR_M[0]:.3g} {body.width_m / _CAR_M[1]:.3g})"
-    return f'<use class="{look}" href="#car" transform="{place}"/>'
-
-
-def _points(points: Sequence[tuple[float, float]]) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
 
 
 def _charts(shots: Sequence[Observation], marks: Sequence[float]) -> tuple[Chart, ...]:

@@ -154,6 +154,11 @@ class Bounds:
         x, y = points[:, 0], points[:, 1]
         return (x >= self.x0) & (x <= self.x1) & (y >= self.y0) & (y <= self.y1)
 
+    def meets(self, points: Points) -> bool:
+        """True if the box round a line touches this one."""
+        xs, ys = zip(*points, strict=True)
+        return min(xs) <= self.x1 and max(xs) >= self.x0 and min(ys) <= self.y1 and max(ys) >= self.y0
+
 
 def track_box(track: Points) -> Bounds:
     """Bounding box of a path."""
@@ -172,7 +177,11 @@ def draw_road(
         visible: Part of the world that can be seen, in m.
         signs: Signs that a map knows, in the frame of the road.
     """
-    paved = [(lane, _resample(lane.centre.points_m)) for lane in road.lanes if lane.kind not in _ON_FOOT]
+    paved = [
+        (lane, _resample(lane.centre.points_m))
+        for lane in road.lanes
+        if lane.kind not in _ON_FOOT and visible.meets(lane.centre.points_m)
+    ]
     surfaces = tuple(
         Surface(lane.id, _lapped(_simplify(centre[part]), lane), lane.width_m, _look_of(lane))
         for lane, centre in sorted(paved, key=lambda pair: _ORDER.index(pair[0].kind))
@@ -341,7 +350,8 @@ def _lines_of(
     places = {(lanes[i].road, lanes[i].index): lanes[i] for i in near if lanes[i].road}
     lines: list[PaintedLine] = []
     for side in (-1, 1):
-        edge = centre + _right_normal(centre) * (side * lane.width_m / 2.0)
+        outward = _right_normal(centre) * side
+        edge = centre + outward * (lane.width_m / 2.0)
         beside = places.get((lane.road, lane.index + side))
         if beside is not None:
             if side < 0 or crossed:
@@ -356,9 +366,12 @@ def _lines_of(
         for other in near:
             if other == index:
                 continue
-            distance, along = _distance(edge, slim[other])
             half = lanes[other].width_m / 2.0
-            shown &= distance > half + (_ON_EDGE_M if crossed else -_ON_EDGE_M)
+            if crossed:  # lanes that go on side by side hide each other's edge, and leave the one that they share
+                shown &= _distance(edge + outward * _ON_EDGE_M, slim[other])[0] > half
+                continue
+            distance, along = _distance(edge, slim[other])
+            shown &= distance > half - _ON_EDGE_M
             opposite = (along * _direction(centre)).sum(axis=1) < -0.9
             touching = opposite & (np.abs(distance - half) <= _ON_EDGE_M)
             centre_line |= touching

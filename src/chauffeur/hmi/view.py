@@ -6,6 +6,7 @@ Whatever the road, the car sets off to the right of the picture, so that its lef
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from chauffeur.concept import Lane, Observation, RoadGraph, Sign, Signal, VehicleState
@@ -53,9 +54,10 @@ def place_facing_right(first: Observation, x_m: float, y_m: float) -> tuple[floa
     return _to_the_right(first).point(x_m, y_m)
 
 
-def mirrored(sign: Sign) -> Sign:
-    """A sign in the frame of pictures, not turned."""
-    return _Turn.by(0.0).sign(sign)
+def as_picture(road: RoadGraph, signs: Iterable[Sign]) -> tuple[RoadGraph, tuple[Sign, ...]]:
+    """A road and its signs in the frame of pictures, not turned: north is up."""
+    turn = _Turn.by(0.0)
+    return RoadGraph(tuple(turn.lane(lane) for lane in road.lanes)), tuple(turn.sign(one) for one in signs)
 
 
 def _to_the_right(first: Observation) -> _Turn:

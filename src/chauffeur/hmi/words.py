@@ -18,11 +18,11 @@ from chauffeur.concept import (
     Mark,
     Metric,
     Outcome,
-    Part,
     PartResult,
     Result,
     Trip,
     Verdict,
+    WishPart,
     result_of,
 )
 from chauffeur.concept.units import MPS_PER_KMH, SpeedUnit, people_speed
@@ -191,7 +191,7 @@ def _account(trip: Trip) -> Iterator[str]:
         yield f"not used: {', '.join(f'“{words}”' for words in trip.unused)}"
 
 
-def _short(parts: Sequence[Part], *results: PartResult) -> str:
+def _short(parts: Sequence[WishPart], *results: PartResult) -> str:
     """Parts that ended so, each with why; empty where there is none."""
     found = (part for part in parts if part.result in results)
     return ", ".join(f"{part.words} ({part.why})" if part.why else part.words for part in found)

@@ -7,7 +7,7 @@ from typing import Final, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Part, Scenario, ScenarioError
+from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError, WishPart
 
 Config = TypeVar("Config", bound=BaseModel)
 PerceptionT = TypeVar("PerceptionT")
@@ -90,10 +90,10 @@ class PlaceJudge:
         raise NotImplementedError
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[WishPart, ...]:
         """The one thing asked for: to be there."""
         why = "" if self.success else "the car stands elsewhere" if self.over else "the car did not get there"
-        return (Part("done" if self.success else "not_done", why=why),)
+        return (WishPart("done" if self.success else "not_done", why=why),)
 
     def outcome(self) -> Outcome:
         """Outcome of the trip, collisions apart."""

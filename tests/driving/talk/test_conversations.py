@@ -1,8 +1,7 @@
-"""Conversations are what the drive told, and verdicts are the ones that decided."""
+"""Conversations are what the drive told."""
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import dataclass, field, replace
 
@@ -18,18 +17,19 @@ from chauffeur.concept import (
     Program,
     Situation,
     Thoughts,
+    Verdict,
 )
 from chauffeur.driving.episode import make_world
 from chauffeur.driving.events import DriveEvent
 from chauffeur.driving.live.plan_messages import Request
-from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Interaction
 from chauffeur.driving.scenarios import find
-from chauffeur.driving.talk import verdicts
+from chauffeur.driving.session import informed
 from chauffeur.driving.talk.conversations import MOST_SAID_SHOWN, Conversations, recalled_of, source_of
 from chauffeur.driving.talk.messages import Conversation, HowWasIt
-from chauffeur.driving.talk.verdicts import JUDGED, verdicts_of
 from chauffeur.driving.talk.wish_queue import Words
+from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.faithfulness import FAITHFULNESS_CHECK, check_faithfulness
 
 PLACE = find("overtake")
 PROGRAM = Program("def drive():\n    set_target_speed(20.0)\n    yield autopilot()\n")
@@ -68,21 +68,17 @@ class Told:
             interaction.stage, interaction.answer = "closed", event
         self.conversations.event(event, interaction)
 
-    def judged(self) -> Conversation:
-        """The next thing to be shown: the verdicts, when they are there."""
-        until = time.monotonic() + 20.0
-        while not (shown := list(self.conversations.look(15.0))):
-            assert time.monotonic() < until
-            time.sleep(0.001)
-        (conversation,) = shown
-        assert isinstance(conversation, Conversation)
-        return conversation
+    def verdicts(self, wish: str, verdicts: tuple[Verdict, ...]) -> Conversation:
+        interaction = self.interactions[wish]
+        interaction.events.append(DriveEvent("verdicts", wish, trip=1, value=verdicts))
+        shown = self.conversations.verdicts(interaction)
+        assert shown is not None
+        return shown
 
 
-def drive(seen: bool = True) -> Told:
-    now, observation = [100.0], instant()
-    look = (lambda trip, tick: observation) if seen else (lambda trip, tick: None)
-    return Told(Conversations((Start(PLACE, 3),), 0.1, look, lambda: now[0]), now)
+def drive() -> Told:
+    now = [100.0]
+    return Told(Conversations(0.1, lambda: now[0]), now)
 
 
 def report_of(tick: int, plan: str, level: str = "follow"):
@@ -100,10 +96,10 @@ def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
     told.event(DriveEvent("planned", "w1", "I slow down to 20 m/s."))
     told.now[0] = 100.5
     told.event(DriveEvent("started", "w1", "", 1, 10))
-    assert list(told.conversations.look(15.0)) == [], "verdicts wait for the set-point"
+    told.verdicts("w1", run_checks(plan(), instant(), Limits(), DRIVE_CHECKS))
     told.now[0] = 101.0
     told.conversations.report(report_of(11, "w1"))
-    shown = told.judged()
+    shown = told.conversations["w1"]
     assert shown.kind == "conversation" and shown.stage == "driven" and shown.spoken
     assert (shown.policy, shown.source) == ("program", PROGRAM.source)
     stages = shown.stages
@@ -122,69 +118,37 @@ def test_somebody_is_asked_once_about_a_wish_they_felt() -> None:
     told.event(DriveEvent("started", "w1", "", 1, 10))
     told.conversations.report(report_of(100, "w1"))
     told.conversations.report(report_of(140, "w1"))
-    told.judged()
     told.conversations.report(report_of(161, "w1"))
-    assert list(told.conversations.look(15.0)) == [HowWasIt("w1", "Slower.")]
+    assert told.conversations.to_ask_about(15.0) == HowWasIt("w1", "Slower.")
     told.event(DriveEvent("finished", "w1", "", 1, 170), closes=True)
-    assert list(told.conversations.look(15.0)) == []
+    assert told.conversations.to_ask_about(15.0) is None
     told.ask("w2", Words("Faster."))
     told.event(DriveEvent("started", "w2", "", 1, 200))
     told.conversations.report(report_of(205, "w2"))
     told.event(DriveEvent("failed", "w2", "It failed.", 1, 205), closes=True)
-    assert not [each for each in told.conversations.look(15.0) if isinstance(each, HowWasIt)], "not felt yet"
+    assert told.conversations.to_ask_about(15.0) is None, "not felt yet"
     assert told.conversations["w2"].outcome == "failed" and told.conversations["w2"].why == "It failed."
     assert told.conversations.last_felt == "w2" and told.conversations.newest("w2")
 
 
 def test_a_refusal_shows_the_check_that_refused_and_the_same_reason() -> None:
     told = drive()
-    verdicts = verdicts_of(plan(UNLAWFUL), instant(), Limits(), DriveEvent("refused", "w1", ""))
-    assert [each.check for each in verdicts if not each.informs] == [JUDGED], (
-        "another reason was told than the checks give"
-    )
-    from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
-
-    failed = [each for each in run_checks(plan(UNLAWFUL), instant(), Limits(), DRIVE_CHECKS) if each.stops]
+    found = run_checks(plan(UNLAWFUL), instant(), Limits(), DRIVE_CHECKS)
+    failed = [each for each in found if each.stops]
     reason = " ".join(each.reason for each in failed)
     told.ask("w1", Words("As fast as it goes."))
     told.conversations.plan("w1", plan(UNLAWFUL))
+    told.verdicts("w1", found)
     told.event(DriveEvent("refused", "w1", reason, 1, 5), closes=True)
-    shown = told.judged()
+    shown = told.conversations["w1"]
     assert shown.outcome == "refused" and shown.why == reason
     assert [each.check for each in shown.verdicts if not each.passed and not each.informs] == [e.check for e in failed]
-
-
-def test_what_was_not_seen_is_not_judged_again() -> None:
-    for event, passed in ((DriveEvent("started", "w1"), True), (DriveEvent("refused", "w1", "Too fast."), False)):
-        (verdict,) = verdicts_of(plan(), None, Limits(), event)
-        assert (verdict.check, verdict.passed) == (JUDGED, passed)
-    started = verdicts_of(plan(UNLAWFUL), instant(), Limits(), DriveEvent("started", "w1"))
-    assert [each.check for each in started if not each.informs] == [JUDGED], "it was started, so that is what is shown"
-
-
-def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
-    may_go_on = threading.Event()
-
-    def slowly(*case: object) -> object:
-        assert may_go_on.wait(20.0)
-        return verdicts_of(*case)  # pyright: ignore
-
-    monkeypatch.setattr(verdicts, "verdicts_of", slowly)
-    told = drive()
-    told.ask("w1", Words("Slower."))
-    told.conversations.plan("w1", plan())
-    told.event(DriveEvent("started", "w1", "", 1, 10))
-    told.conversations.report(report_of(11, "w1"))
-    assert list(told.conversations.look(15.0)) == []
-    assert list(told.conversations.look(15.0)) == []
-    may_go_on.set()
-    assert told.judged().verdicts[0].check == "format-v1"
 
 
 @pytest.mark.parametrize("thoughts", ["1" * 8000, "1 " * 4000, "1." * 4000, "(" * 8000, "the left lane " * 570])
 def test_thoughts_of_the_longest_kind_are_judged_at_once(thoughts: str) -> None:
     before = time.thread_time()
-    assert verdicts_of(plan(thoughts=thoughts), instant(), Limits(), DriveEvent("started", "w1"))
+    assert informed(FAITHFULNESS_CHECK, plan(thoughts=thoughts), instant(), Limits(), check_faithfulness)
     assert (
         time.thread_time() - before < 5.0
     )  # one second on an idle core; what grows faster than the text takes minutes
@@ -202,9 +166,12 @@ def test_what_a_plan_says_does_not_grow_without_bound() -> None:
 
 def test_an_explanation_that_does_not_fit_informs() -> None:
     lies = plan(thoughts="I change to the left lane and speed up to 30 m/s.")
-    verdicts = verdicts_of(lies, instant(), Limits(), DriveEvent("started", "w1"))
-    (told,) = [each for each in verdicts if each.informs]
-    assert not told.passed and told.reason
+    found = informed(FAITHFULNESS_CHECK, lies, instant(), Limits(), check_faithfulness)
+    told = drive()
+    told.ask("w1", Words("Left."))
+    verdicts = told.verdicts("w1", found).verdicts
+    (fits,) = [each for each in verdicts if each.informs]
+    assert not fits.passed and fits.reason
 
 
 def test_parameters_are_shown_one_a_line() -> None:

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 from chauffeur.bench.lampilot.expert import variants
+from chauffeur.bench.lampilot.rehearsal import RehearsedChoice, rehearse
 from chauffeur.concept import Scenario
 from chauffeur.driving.judge.goals import HeldGoal, OvertakeGoal, make_goal
 from chauffeur.driving.judge.lampilot import GoalJudge
@@ -21,7 +22,6 @@ from chauffeur.driving.judge.metrics import (
     WEIGHTS,
     points,
 )
-from chauffeur.driving.rehearsal import RehearsedChoice, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception

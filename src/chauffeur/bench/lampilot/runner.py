@@ -10,13 +10,13 @@ from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
+from chauffeur.bench.lampilot.rehearsal import label
 from chauffeur.bench.lampilot.requests import PlainRequests, Requests
 from chauffeur.bench.lampilot.results import publish_results, results
 from chauffeur.bench.lampilot.rollout import BASELINES
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.concept import ConfigError
 from chauffeur.driving.judge.metrics import ruler_named
-from chauffeur.driving.rehearsal import label
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting
 from chauffeur.safety.shield import SHIELD_VERSION

@@ -19,8 +19,9 @@ from chauffeur.bench.kernel.stats import DRAWS, LEAST_CLUSTERS, Interval
 from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, FlipList, Gallery
 from chauffeur.driving.files import publish
 from chauffeur.hmi.document import asset, content_hash, fill, printable
-from chauffeur.hmi.drive_svg import SYMBOLS, draw_strip
+from chauffeur.hmi.drive_svg import draw_strip
 from chauffeur.hmi.payload import program_tokens
+from chauffeur.hmi.stills import SYMBOLS
 
 _STYLES = ("scene.css", "trip.css", "panels.css")
 """Of the trip page, whose look the report shares."""

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from chauffeur.concept import JudgedBy, Metric, Outcome, Part, ProgramState, Setpoints
+from chauffeur.concept import JudgedBy, Metric, Outcome, ProgramState, Setpoints, WishPart
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.driving.judge.acts import JudgedAct, judge, wanted
 from chauffeur.driving.judge.setpoints import gap_asked, planned_gap, speed_asked
@@ -117,9 +117,9 @@ class ActsReferee:
         return bool(self.judged) and self._is_done
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[WishPart, ...]:
         """The acts in plain words, and what became of each."""
-        return tuple(Part(one.result, act_words(one.act).replace(" —", ","), one.why) for one in self.judged)
+        return tuple(WishPart(one.result, act_words(one.act).replace(" —", ","), one.why) for one in self.judged)
 
     @property
     def judged_by(self) -> JudgedBy:

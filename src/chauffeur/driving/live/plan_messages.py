@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from typing import Final, TypeVar
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Observation, Plan
+from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Observation, Plan, Verdict
 from chauffeur.driving.events import DriveEvent, WishEventKind
 from chauffeur.driving.live.messages import MessageError
 from chauffeur.language.questions import said_aside
@@ -116,15 +115,16 @@ class PlanningInputs:
 
 @dataclass(frozen=True, slots=True)
 class _EventFields:
-    """What goes of an event from process to process: only of wishes, without a value, and never final."""
+    """What goes of an event from process to process: only of wishes, with no value but verdicts, and never final."""
 
-    kind: WishEventKind
+    kind: WishEventKind | Literal["verdicts"]
     wish: str
     text: str = ""
     trip: int = 0
     tick: int = 0
     again: bool = True
     offer: str = ""
+    verdicts: tuple[Verdict, ...] = ()
 
 
 _T = TypeVar("_T")
@@ -140,7 +140,10 @@ def encode(message: Request | PlanMessage | DriveEvent | PlanningInputs) -> byte
         case PlanMessage():
             return _order.dump_json(message)
         case DriveEvent():
-            return json.dumps({name: getattr(message, name) for name in _EventFields.__slots__}).encode()
+            verdicts = message.value if isinstance(message.value, tuple) else ()
+            judged = tuple(_short(one, len(verdicts)) for one in verdicts if isinstance(one, Verdict))
+            fields = {name: getattr(message, name) for name in _EventFields.__slots__ if name != "verdicts"}
+            return _event.dump_json(_EventFields(**fields, verdicts=judged))
         case PlanningInputs():
             return _brief.dump_json(message)
 
@@ -157,7 +160,15 @@ def read_order(payload: bytes) -> PlanMessage:
 
 def read_event(payload: bytes) -> DriveEvent:
     """From bytes. Raises MessageError."""
-    return DriveEvent(**asdict(_read(_event, payload)))
+    event = _read(_event, payload)
+    fields = {name: getattr(event, name) for name in _EventFields.__slots__ if name != "verdicts"}
+    return DriveEvent(**fields, value=event.verdicts or None)
+
+
+def _short(verdict: Verdict, of: int) -> Verdict:
+    """A verdict among so many whose texts fit together into an event."""
+    most = MOST_SAID // (2 * of)
+    return replace(verdict, reason=verdict.reason[:most], remedy=verdict.remedy[:most], alignment=None)
 
 
 def read_brief(payload: bytes) -> PlanningInputs:

@@ -23,6 +23,7 @@ from chauffeur.concept import (
     Observation,
     PersonId,
     Plan,
+    Program,
     Thoughts,
 )
 from chauffeur.describe.answers import with_doing, with_way
@@ -46,13 +47,14 @@ from chauffeur.driving.loop import LoopMemory
 from chauffeur.driving.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
 from chauffeur.driving.questions import NOT_MEANT, TAKEN_BACK, Conversing
 from chauffeur.driving.seat import SeatCamera
-from chauffeur.driving.session import parse_wish
+from chauffeur.driving.session import informed, parse_wish
 from chauffeur.driving.surroundings import describing, opened, weathered
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.checks import drive_checks, run_checks
+from chauffeur.safety.faithfulness import FAITHFULNESS_CHECK, check_faithfulness
 from chauffeur.worlds.places import TownPlaces
 
 FOLLOW_FOR_S: Final = 600.0
@@ -164,6 +166,12 @@ class Planning:
             self._tell("unplanned", request.wish, str(error), again=False)
             return
         self._tell("planned", request.wish, order.plan.thoughts.text)
+        if isinstance(order.plan.policy, Program):
+            seen, limits = self._mirror.world.observe(), self._mirror.limits
+            fits = informed(FAITHFULNESS_CHECK, order.plan, seen, limits, check_faithfulness)
+            self._rings.events.write(
+                encode(DriveEvent("verdicts", request.wish, "", self._mirror.trip, self._mirror.tick, value=fits))
+            )
         if order.plan.policy is not None and (pending := self._talk.dialogue.pending):
             self._tell("waits", request.wish, pending)
 

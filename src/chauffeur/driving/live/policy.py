@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, takewhile
-from typing import Final
+from typing import Final, Literal
 
 from chauffeur.concept import (
     ActionMatrix,
@@ -38,6 +38,7 @@ from chauffeur.concept import (
     Setpoints,
     Trajectory,
     Turn,
+    Verdict,
 )
 from chauffeur.concept import Policy as AnyPolicy
 from chauffeur.driving.events import DriveEvent, WishEventKind
@@ -275,6 +276,7 @@ class Policy:
             self._tell("refused", order.wish, plan.refusal or "The plan has no policy.")
             return
         verdicts = run_checks(plan, observation, self._mirror.limits, self._checks)
+        self._tell("verdicts", order.wish, "", verdicts)
         if failed := reasons_once(verdicts):
             self._tell("refused", order.wish, failed)
             return
@@ -529,8 +531,11 @@ class Policy:
             return True
         return last.plan != wish or last.state != "running"
 
-    def _tell(self, kind: WishEventKind, wish: str, text: str) -> None:
-        self._rings.events.write(encode(DriveEvent(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
+    def _tell(
+        self, kind: WishEventKind | Literal["verdicts"], wish: str, text: str, value: tuple[Verdict, ...] | None = None
+    ) -> None:
+        event = DriveEvent(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick, value=value)
+        self._rings.events.write(encode(event))
 
 
 def _goes_on(road: RoadGraph, before: LaneId | None, now: LaneId | None) -> bool:

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, Self
 
-from chauffeur.concept import NOBODY, SandboxError
+from chauffeur.concept import NOBODY, SandboxError, Verdict
 from chauffeur.driving.emergency import STOPPING, stop_wanted
 from chauffeur.driving.events import FINAL, DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.driving.judge.account import result_of_event
@@ -95,6 +95,13 @@ class Interaction:
     def started_tick(self) -> int | None:
         """When driving it began; None if it never did."""
         return next((event.tick for event in self.events if event.kind in ("started", "resumed")), None)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """V: of each check the newest."""
+        told = (event.value for event in self.events if isinstance(event.value, tuple))
+        found = {one.check: one for several in told for one in several if isinstance(one, Verdict)}
+        return tuple(sorted(found.values(), key=lambda one: not one.vetoes))
 
     @property
     def taken_over(self) -> bool:
@@ -513,11 +520,14 @@ class Runtime:
 
     def _take(self, event: DriveEvent, sent_by: Role) -> None:
         interaction = self.interactions.get(event.wish)
-        if interaction is None or interaction.stage == "closed":
+        if interaction is None or (interaction.stage == "closed" and event.kind != "verdicts"):
             if interaction is None:
                 self._tell(event)
             return
-        if event.kind == "stale" or (event.kind == "unplanned" and sent_by == "planner"):
+        if event.kind == "verdicts":
+            interaction.events.append(event)
+            self._tell(event)
+        elif event.kind == "stale" or (event.kind == "unplanned" and sent_by == "planner"):
             if not event.again:
                 self._close(interaction, event)
                 return

@@ -7,25 +7,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Feedback, History, HistoryItem, Observation, Parameters, Plan, Policy, Program
+from chauffeur.concept import Feedback, History, HistoryItem, Parameters, Plan, Policy, Program, Verdict
 from chauffeur.concept.units import people_speed
 from chauffeur.driving.events import DriveEvent
 from chauffeur.driving.judge.account import unused_of
 from chauffeur.driving.live.messages import Report
-from chauffeur.driving.live.starts import Start
 from chauffeur.driving.live.supervisor import Interaction
-from chauffeur.driving.talk.messages import Conversation, HowWasIt, StageTimes
-from chauffeur.driving.talk.verdicts import Judge, JudgedCase
+from chauffeur.driving.talk.messages import Conversation, HowWasIt, StageTimes, VerdictShown
 from chauffeur.driving.talk.wish_queue import Words
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.programs.loops import has_end
 
-JUDGED_WITHIN_S: Final = 1.0
-"""Verdicts are worked out when the set-point has changed, or so long after the start: nothing waits for them."""
 FELT_AFTER_S: Final = 3.0
 """A wish that was driven for less, in the car's time, cannot have been felt: nobody is asked about it."""
-JUDGED_AT_END_S: Final = 2.0
-"""How long the end of a session waits for verdicts that are still worked on."""
 MOST_SAID_SHOWN: Final = 40
 """What a plan said last; every screen is told a conversation anew whenever something is added to it."""
 
@@ -45,7 +39,6 @@ class _Wish:
     felt_from_s: float | None = None
     trip: int = 0
     plan: Plan | None = None
-    to_judge: DriveEvent | None = None
     asked_how: bool = False
 
 
@@ -54,23 +47,18 @@ class Conversations:
 
     def __init__(
         self,
-        starts: tuple[Start, ...],
         dt_s: float,
-        instant: Callable[[int, int], Observation | None],
         clock: Callable[[], float],
     ) -> None:
         """None yet.
 
         Args:
-            starts: The trips.
             dt_s: Control period in the car's time.
-            instant: What was seen at (trip, tick).
             clock: Monotonic time, s.
         """
-        self._starts, self._dt_s, self._instant, self._clock = starts, dt_s, instant, clock
+        self._dt_s, self._clock = dt_s, clock
         self._wishes: dict[str, _Wish] = {}
         self._trip, self._now_s = 0, 0.0
-        self._judge = Judge()
 
     def __iter__(self) -> Iterator[Conversation]:
         return (each.shown for each in self._wishes.values())
@@ -120,7 +108,7 @@ class Conversations:
                 stages = replace(stages, plan_s=now_s - each.asked_s)
                 shown = replace(shown, stage=interaction.stage, thoughts=shown.thoughts or event.text, why="")
             case "started":
-                each.started_s, each.to_judge = now_s, event
+                each.started_s = now_s
                 stages = replace(stages, check_s=None if each.planned_s is None else now_s - each.planned_s)
                 each.felt_from_s, each.trip = event.tick * self._dt_s, event.trip
                 shown = replace(shown, stage="driven", why="")
@@ -130,8 +118,6 @@ class Conversations:
                 shown = replace(shown, waits=event.text)
             case "said":
                 shown = replace(shown, said=_most((*shown.said, event.text)))
-            case "refused":
-                each.to_judge = event
             case _:
                 shown = replace(shown, why=event.text)
         if event.final:
@@ -140,8 +126,6 @@ class Conversations:
             why = " ".join(text for text in (event.text, left_out) if text)
             shown = replace(shown, stage="closed", waits="", outcome=event.kind, result=event.result or "", why=why)
         each.shown = replace(shown, stages=stages)
-        if event.kind == "refused":
-            self._hand_in(each)
         return each.shown
 
     def recalled(self, wish: str, history: History) -> None:
@@ -158,6 +142,11 @@ class Conversations:
         ends = plan.policy is not None and may_end(plan.policy)
         return self.change(wish, thoughts=plan.thoughts.text, policy=kind, source=source, verdicts=(), ends=ends)
 
+    def verdicts(self, interaction: Interaction) -> Conversation | None:
+        """V, as far as it was told; None where the wish is none of this session."""
+        wish = interaction.request.wish
+        return self.change(wish, verdicts=tuple(map(_shown, interaction.verdicts))) if wish in self else None
+
     def report(self, report: Report) -> Conversation | None:
         """A control period: the first one that follows a wish is where its set-point changed."""
         self._trip, self._now_s = report.trip, report.tick * self._dt_s
@@ -171,43 +160,28 @@ class Conversations:
         each.shown = replace(each.shown, stages=stages)
         return each.shown
 
-    def look(self, patience_s: float, *, over: bool = False) -> Iterator[Conversation | HowWasIt]:
-        """Verdicts that are due, and wishes that are to be asked about.
+    def to_ask_about(self, patience_s: float) -> HowWasIt | None:
+        """The question about a wish that was felt, if one is due.
 
         Args:
             patience_s: So long a wish is driven, in the car's time, before the person is asked how it is.
-            over: Whether the drive is.
         """
-        for each in self._wishes.values():
-            if each.to_judge is not None and each.started_s is not None:
-                changed = each.shown.stages.set_point_s is not None
-                if over or changed or self._clock() - each.started_s > JUDGED_WITHIN_S:
-                    self._hand_in(each)
-        for wish, verdicts in self._judge.ready(JUDGED_AT_END_S if over else 0.0):
-            yield self.change(wish, verdicts=verdicts)
         newest = self._wishes.get(self.last_felt)
         if newest is None or newest.asked_how or newest.felt_from_s is None:
-            return
+            return None
         felt_s = self._now_s - newest.felt_from_s
         if newest.trip != self._trip:  # another road has begun, and nobody felt the end of this one
             newest.asked_how = self._trip > newest.trip
         elif felt_s >= patience_s or (newest.shown.stage == "closed" and felt_s >= FELT_AFTER_S):
             newest.asked_how = True
             if not newest.shown.opinion:
-                yield HowWasIt(newest.shown.wish, newest.shown.text)
+                return HowWasIt(newest.shown.wish, newest.shown.text)
+        return None
 
-    def close(self) -> None:
-        """Judge nothing more."""
-        self._judge.close()
 
-    def _hand_in(self, each: _Wish) -> None:
-        """Have a plan judged again, in the judge's own time."""
-        event, each.to_judge = each.to_judge, None
-        if event is None or each.plan is None:
-            return
-        limits = self._starts[max(1, min(event.trip, len(self._starts))) - 1].limits
-        observation = self._instant(event.trip, event.tick)
-        self._judge.submit(JudgedCase(each.shown.wish, each.plan, observation, limits, event))
+def _shown(verdict: Verdict) -> VerdictShown:
+    compared = verdict.not_compared is None
+    return VerdictShown(verdict.check, verdict.passed, verdict.reason, not verdict.vetoes, verdict.proven, compared)
 
 
 def _most(said: tuple[str, ...]) -> tuple[str, ...]:

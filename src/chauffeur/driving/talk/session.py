@@ -32,7 +32,6 @@ from chauffeur.driving.talk.messages import (
     Answered,
     Button,
     Confirm,
-    Conversation,
     Ended,
     Evaluate,
     Hand,
@@ -139,7 +138,7 @@ class Talk(DriveSession):
         self._looking = False
         self._keeper: MemoryWorker | None = None
         self._asking = WishQueue(person, books)
-        self._conversations = Conversations(settings.starts, self._dt_s, self._instant, time.monotonic)
+        self._conversations = Conversations(self._dt_s, time.monotonic)
         self._changes: list[_Change] = []
         self._newest: dict[str, Said] = {}
         self._asked_how: HowWasIt | None = None
@@ -453,6 +452,8 @@ class Talk(DriveSession):
                 self._say_if(self._conversations.plan(event.wish, plan))
             case Report() as report:
                 self._report(report)
+            case tuple() if event.wish in self._conversations and self._runtime is not None:
+                self._say_if(self._conversations.verdicts(self._runtime.interactions[event.wish]))
             case str() as process:
                 self._say(Note(f"The {process} process is replaced. {event.text}", trouble=True))
             case None:
@@ -498,13 +499,11 @@ class Talk(DriveSession):
         if self._looking:
             view.offer(self._window)
             self._say_if(self._window.news())
-        for said in self._conversations.look(self._ask_after_s):
-            if isinstance(said, HowWasIt):
-                if self._stopping:
-                    continue
-                self._asked_how = said
-                self._speak("How was it?")
-            self._say(said)
+        asked = self._conversations.to_ask_about(self._ask_after_s)
+        if asked is not None and not self._stopping:
+            self._asked_how = asked
+            self._speak("How was it?")
+            self._say(asked)
 
     def _instant(self, trip: int, tick: int) -> Observation | None:
         return None if self._view is None else self._view.at(trip, tick)
@@ -546,9 +545,6 @@ class Talk(DriveSession):
         if not self.outcome and report is not None and report.ended:
             self.outcome = report.outcome
         self.outcome = self.outcome or ("broken_off" if broken else "died")
-        for said in self._conversations.look(self._ask_after_s, over=True):
-            if isinstance(said, Conversation):
-                self._say(said)
         for text in (*self._asking.give_up(runtime), *(change.words.text for change in self._changes)):
             self._say(Note(f"Not asked: “{text}”. {OVER}"))
         self.tally.end(runtime, died=self.outcome == "died")
@@ -561,7 +557,6 @@ class Talk(DriveSession):
 
     def _close_parts(self) -> None:
         self._attention.close()
-        self._conversations.close()
         self._window.close()
         if self._runtime is not None:
             self._runtime.close()

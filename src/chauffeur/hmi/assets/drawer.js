@@ -309,7 +309,8 @@ export function makeDrawer(canvas) {
   function drawPlace({ n, x, y, to }) {
     const [bx, by, bw, bh] = view.box;
     const [sx, sy] = toScreen(x, y);
-    const [px, py] = to ? [Math.min(Math.max(sx, bx + 22), bx + bw - 22), Math.min(Math.max(sy, by + 66), by + bh - 60)] : [sx, sy];
+    const [left, top, bottom] = n ? [22, 66, 60] : [10, 10, 10];
+    const [px, py] = to ? [Math.min(Math.max(sx, bx + left), bx + bw - left), Math.min(Math.max(sy, by + top), by + bh - bottom)] : [sx, sy];
     const away = px !== sx || py !== sy;
     if (!to) {
       if (px < bx || px > bx + bw || py < by || py > by + bh) return;
@@ -371,7 +372,7 @@ export function makeDrawer(canvas) {
     drawWishes(scene);
     drawLights(scene.lights);
     if (words) {
-      plates.push(boxOf(ego));
+      for (const named of [ego, scene.ghost, lead && lead.body, ...bodies.filter((body) => body.meant)]) if (named) plates.push(boxOf(named));
       onScreen();
       for (const name of road.names) drawName(name);
       inWorld();

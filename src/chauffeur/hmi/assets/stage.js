@@ -71,20 +71,19 @@ function makeStage() {
       posts: along ? y1 + 1.8 : undefined,
     };
     const { width, height, scale } = size;
-    const box = [0, 0, width, height];
-    if (along) {
-      drawer.draw(road, scene, { x: ego.x, y: y0, scale, middle: [width * 0.34, CAPTION_PX], box });
-    } else if (whole) {
-      drawer.draw(road, scene, { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale, middle: [width / 2, height / 2], box });
-    } else {
-      drawer.draw(road, scene, { x: ego.x, y: ego.y, scale, middle: [width / 2, height / 2], box });
-    }
+    const [middleX, middleY] = [(x0 + x1) / 2, (y0 + y1) / 2];
+    const follows = !along && !whole;
+    const [w, h] = [Math.min(200, width * 0.34), Math.min(150, height * 0.34)];
+    const corner = [width - w - 8, 8, w, h];
+    drawer.draw(road, scene, {
+      x: along || follows ? ego.x : middleX, y: along ? y0 : follows ? ego.y : middleY, scale,
+      middle: along ? [width * 0.34, CAPTION_PX] : [width / 2, height / 2],
+      box: [0, 0, width, height], taken: follows ? [[corner[0], 0, width, h + 12]] : [],
+    });
     if (!along) drawer.drawScale();
-    if (!along && !whole) {
-      const [w, h] = [Math.min(200, width * 0.34), Math.min(150, height * 0.34)];
-      const corner = [width - w - 8, 8, w, h];
+    if (follows) {
       const small = Math.min(w / (x1 - x0), h / (y1 - y0));
-      drawer.draw(road, scene, { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: small, middle: [corner[0] + w / 2, 8 + h / 2], box: corner }, false);
+      drawer.draw(road, scene, { x: middleX, y: middleY, scale: small, middle: [corner[0] + w / 2, 8 + h / 2], box: corner }, false);
     }
     const state = ego.crashed ? 'crashed' : `at ${pace(drive.speed[index])} ${trip.pace.unit}`;
     canvas.setAttribute('aria-label', `The road from above at ${drive.time[index].toFixed(1)} seconds: the car is ${state}${shield ? `, and the shield acts: ${shield}` : ''}.`);

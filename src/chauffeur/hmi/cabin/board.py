@@ -13,7 +13,7 @@ from chauffeur.concept.units import SpeedUnit
 from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, as_json, draw_road, flat
-from chauffeur.hmi.view import mirrored
+from chauffeur.hmi.view import as_picture
 from chauffeur.hmi.words import pace_of, passenger_units
 
 _MARGIN_M = 20.0
@@ -28,10 +28,10 @@ def in_unit(told: Conversation, unit: SpeedUnit) -> Conversation:
 
 def drawn(road: Road) -> dict[str, Any]:
     """As a JSON object: the lanes as they were told, and the road as the pages' drawer takes it."""
-    lanes = tuple(
+    told = tuple(
         Lane(
             lane.id,
-            Polyline.of((x, -y) for x, y in lane.centre_m),
+            Polyline.of(lane.centre_m),
             lane.width_m,
             0.0,
             kind="emergency" if lane.shoulder else lane.what,
@@ -42,10 +42,11 @@ def drawn(road: Road) -> dict[str, Any]:
         )
         for lane in road.lanes
     )
+    graph, signs = as_picture(RoadGraph(told), road.signs)
+    lanes = graph.lanes
     xs = [x for lane in lanes for x, _ in lane.centre.points_m]
     ys = [y for lane in lanes for _, y in lane.centre.points_m]
     everything = Bounds(min(xs, default=0.0), min(ys, default=0.0), max(xs, default=0.0), max(ys, default=0.0))
-    signs = tuple(mirrored(one) for one in road.signs)
     return {
         "kind": road.kind,
         "world": road.world,
@@ -61,7 +62,7 @@ def drawn(road: Road) -> dict[str, Any]:
             for lane in lanes
             if lane.kind not in _ON_FOOT
         ],
-    } | as_json(draw_road(RoadGraph(lanes), (), everything.grown(_MARGIN_M), signs))
+    } | as_json(draw_road(graph, (), everything.grown(_MARGIN_M), signs))
 
 
 MOST_WAITING: Final = 500

@@ -210,8 +210,9 @@ function endQuestion() {
 
 function answer(yes) {
   if (!question || !say('confirm', { yes })) return;
-  write($('heard-words'), yes ? `“${question.text}”` : 'Then say it again, or type it.');
   endQuestion();
+  if (yes) showHint();
+  else write($('heard-words'), 'Then say it again, or type it.');
 }
 
 function showHeard() {

@@ -112,7 +112,7 @@ export function makeScene(canvas) {
     else if (calm.matches) view = Math.round(ego.h / (Math.PI / 2)) * (Math.PI / 2);
     else view += turned(view, ahead(ego)) * 0.08;
     return {
-      x: ego.x, y: ego.y, scale: road.tight ? Math.max(9, length / 48) : Math.max(5, length / 80), turn: -view - (tall ? Math.PI / 2 : 0),
+      x: ego.x, y: ego.y, scale: road.tight ? Math.max(9, length / 48) : Math.max(4, length / 88), turn: -view - (tall ? Math.PI / 2 : 0),
       // Somewhat behind the middle: what lies ahead matters more.
       middle: tall ? [width / 2, height * 0.6] : [width * 0.42, height / 2], box: [0, 0, width, height],
       taken: [[0, 0, width, 42]], // what the car does is told there

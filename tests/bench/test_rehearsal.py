@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
+from chauffeur.bench.lampilot.rehearsal import RehearsedChoice, label, rehearse
 from chauffeur.concept import Metric, Outcome
-from chauffeur.driving.rehearsal import RehearsedChoice, label, rehearse
-from chauffeur.programs import Sandbox
+from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -76,6 +76,12 @@ def world() -> HighwayWorld:
 
 
 Try = Callable[..., RehearsedChoice]
+
+
+@pytest.fixture(scope="module")
+def sandbox() -> Iterator[Sandbox]:
+    with Sandbox(UNHURRIED) as one:
+        yield one
 
 
 @pytest.fixture
