@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from coached_data import server_module
 from openloop_data import EFFORT, ROTATION, SCENES, Scripted, write_nuscenes
-from small_run import quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.conformance import faults
@@ -29,6 +28,7 @@ from chauffeur.concept import ConfigError, DataError
 from chauffeur.foreign.waypoints import read_waypoints
 from chauffeur.planners.prompts.waypoints import read_motion, waypoints_text
 from chauffeur.planners.registry import make_answerer
+from small_run import quiet
 
 PATH = np.array([[4.0, 0.1], [8.0, 0.2], [12.0, -0.3], [16.0, 0.4], [20.0, 0.5], [24.0, 0.6]])
 

@@ -12,7 +12,6 @@ import openloop_data
 import pytest
 from coached_data import server_module
 from openloop_data import EFFORT, Scripted, circle, straight, write_nuscenes
-from small_run import quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.conformance import faults
@@ -27,6 +26,7 @@ from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.foreign.waypoints import read_waypoints
 from chauffeur.planners.prompts.waypoints import read_motion, waypoints_text
+from small_run import quiet
 
 HEAD = "Scene Number,Instruction Type,Instruction\n"
 SAYS = "The passenger says: "

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small_run import Inline, quiet
 
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
@@ -29,6 +28,7 @@ from chauffeur.driving.episode import drive_without_program
 from chauffeur.driving.judge.goals import make_goal
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
+from small_run import Inline, quiet
 
 WISHES = load_wishes()
 DRIVES = [wish for wish in WISHES if wish.right == "drive"]

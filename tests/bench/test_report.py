@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_folders import HOSTILE, mixed, outcome, read_lines, signals, write_lines, write_run
-from small_run import Inline, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.metrics import missed
@@ -27,6 +25,8 @@ from chauffeur.bench.report.text import render_markdown
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.driving.judge.metrics import driving_score
+from report_folders import HOSTILE, mixed, outcome, read_lines, signals, write_lines, write_run
+from small_run import Inline, quiet
 
 PAPER = "lampilot-paper-v1"
 

@@ -38,11 +38,10 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
     return publish(path, render_page(recorded).encode(), "page")
 
 
-def render_page(recorded: RecordedTrip) -> str:
-    """The page of a trip as text."""
+def render_page(recorded: RecordedTrip, *, embedded: bool = False) -> str:
+    """The page of a trip as text; an `embedded` one leaves out the name, which the page around it says."""
     payload = page_payload(recorded)
-    style = "\n".join(asset(name) for name in _STYLES)
-    script = "(() => {\n'use strict';\n" + "\n".join(asset(name) for name in _SCRIPTS) + "\n})();"
+    style, script = page_assets()
     policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
     return fill(
         asset("trip.html"),
@@ -52,11 +51,18 @@ def render_page(recorded: RecordedTrip) -> str:
             "wish": html.escape(printable(payload["wish"])),
             **{name: html.escape(printable(payload["outcome"][of])) for name, of in _OUTCOME.items()},
             "simulated": html.escape(payload["simulated"]),
+            "look": "embedded" if embedded else "",
             "style": style,
             "script": script,
             "data": embed_json(payload),
         },
     )
+
+
+def page_assets() -> tuple[str, str]:
+    """Style and script of every trip's page."""
+    script = "\n".join(asset(name) for name in _SCRIPTS)
+    return "\n".join(asset(name) for name in _STYLES), f"(() => {{\n'use strict';\n{script}\n}})();"
 
 
 def embed_json(value: Any) -> str:

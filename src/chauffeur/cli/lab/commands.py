@@ -1,11 +1,11 @@
-"""What the lab adds to `chauffeur`: `bench`, `report`, `model`."""
+"""What the lab adds to `chauffeur`: `bench`, `view`, `report`, `model`."""
 
 from __future__ import annotations
 
 import typer
 
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.lab import adapt_vlm, coach, coach_town, quantise_vlm, report, scenes, scenes_frames, train
+from chauffeur.cli.lab import adapt_vlm, coach, coach_town, quantise_vlm, report, scenes, scenes_frames, train, view
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.policies import policies_app
 
@@ -23,6 +23,9 @@ model_app = typer.Typer(
 
 def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
     """Add the lab's commands to `chauffeur`, under the headings of its help."""
+    app.command(epilog=view.EXAMPLES, rich_help_panel=look, short_help="Runs and trips on one page, live or a file.")(
+        view.view
+    )
     app.command(epilog=report.EXAMPLES, rich_help_panel=look)(report.report)
     app.add_typer(bench_app, name="bench", rich_help_panel=measure, epilog=BENCH_EXAMPLES)
     bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)

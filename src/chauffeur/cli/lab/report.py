@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from chauffeur.cli.examples import help_text
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 EXAMPLES = help_text("report")
 
@@ -45,10 +40,12 @@ def report(
     from chauffeur.bench.kernel.report import report_csv
     from chauffeur.bench.report.build import Choices, build_report, read_runs
     from chauffeur.bench.report.inspect_log import write_inspect_log
-    from chauffeur.bench.report.page import write_report_page
     from chauffeur.bench.report.text import render_markdown
+    from chauffeur.bench.viewer.content import Content
+    from chauffeur.bench.viewer.shelf import Shelf
     from chauffeur.cli.console import columns, path_text, plain, stdout
     from chauffeur.cli.lab.bench_run import show_tables
+    from chauffeur.cli.lab.view import progress, write_page_of
     from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
     from chauffeur.driving.files import publish
@@ -58,10 +55,11 @@ def report(
     if inspect is not None:
         needs("inspect", "An Inspect log", "inspect_ai")
     console = stdout()
-    with _progress(console) as show:
+    with progress(console) as show:
         made = build_report(runs, Choices(metrics or "", data, gallery), show)
     folder = out or (runs[0] if len(runs) == 1 else runs[0].resolve().parent) / "report"
-    page = write_report_page(folder / "report.html", made)
+    content = Content(Shelf([run.resolve() for run in runs]), data, metrics or "")
+    page = write_page_of(console, content, folder / "report.html", gallery)
     written = [("page", path_text(page))]
     figures = report_csv((*made.tables, *made.pairs))
     for kind, text in (("md", render_markdown(made)), ("csv", figures)):
@@ -78,23 +76,3 @@ def report(
     console.print(columns(written, indent=0))
     if browser:
         typer.launch(page.resolve().as_uri())
-
-
-@contextmanager
-def _progress(console: Console) -> Generator[Callable[[str, int, int], None]]:
-    """One bar for the part that takes time: driving items again."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    with Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        console=console,
-        transient=True,
-    ) as bar:
-        task = bar.add_task("reading runs", total=None)
-
-        def show(what: str, done: int, total: int) -> None:
-            bar.update(task, description=what, completed=done, total=total)
-
-        yield show
