@@ -4,14 +4,13 @@
     python docs/pictures.py overtake cabin  # some of them
 
 `vilad-speed` measures for an hour. Drives and decisions repeat bit for bit; the cabin's session runs in real time, so
-that picture differs from one run to the next. `trip`, `cabin` and `viewer` need chromium, `viewer` LaMPilot's data too.
+that picture differs from one run to the next. `trip`, `viewer` and `cabin` need chromium.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
-import os
 import subprocess
 import sys
 import tempfile
@@ -55,6 +54,30 @@ def trip() -> None:
         asyncio.run(_browse(look))
 
 
+def viewer() -> None:
+    """A sample of a run in the viewer, its drive beside it."""
+    from chauffeur.bench.viewer.content import Content
+    from chauffeur.bench.viewer.server import Viewer
+    from chauffeur.bench.viewer.shelf import Shelf
+
+    with tempfile.TemporaryDirectory() as folder:
+        suite, run = Path(folder) / "suite", Path(folder) / "lampilot-onboard"
+        _chauffeur("bench", "scenes", "generate", "--items", 60, "--out", suite)
+        _chauffeur("bench", "lampilot", "--data", suite / "test", "--planner", "onboard", "--out", run)
+        content = Content(Shelf([run]))
+        (name,) = content.index()["order"]
+        served = Viewer(content)
+
+        async def look(tab: Tab) -> None:
+            async with served.serving():
+                await tab.open(f"{served.url}#/runs/{name}/0", (1280, 800))
+                await tab.until("document.querySelector('.drive iframe')")
+                await asyncio.sleep(3.0)  # into the drive
+                await tab.picture(IMAGES / "viewer.png")
+
+        asyncio.run(_browse(look))
+
+
 def cabin() -> None:
     """The cabin page while a wish is driven."""
     from cabin_drive import driving
@@ -74,36 +97,6 @@ def cabin() -> None:
         asyncio.run(_browse(look))
 
 
-def viewer() -> None:
-    """A sample of a run in the viewer, of LaMPilot's data: `CHAUFFEUR_LAMPILOT` names the folder."""
-    from PIL import Image
-
-    from chauffeur.bench.viewer.content import Content
-    from chauffeur.bench.viewer.server import Viewer
-    from chauffeur.bench.viewer.shelf import Shelf
-
-    with tempfile.TemporaryDirectory() as folder:
-        run = Path(folder) / "lampilot-onboard"
-        _chauffeur(
-            "bench", "lampilot", "--data", os.environ["CHAUFFEUR_LAMPILOT"], "--planner", "onboard", "--out", run
-        )
-        content = Content(Shelf([run]))
-        (name,) = content.index()["order"]
-        rows = content.rows(name)["rows"]
-        place = next(place for place, row in enumerate(rows) if row["item"].startswith("left_overtake"))
-        shown = Viewer(content)
-
-        async def look(tab: Tab) -> None:
-            async with shown.serving():
-                await tab.open(f"{shown.url}#/runs/{name}/{place}", (1280, 800))
-                await tab.until("document.querySelector('.drive iframe')")
-                await asyncio.sleep(3.0)  # into the drive
-                await tab.picture(IMAGES / "viewer.png")
-
-        asyncio.run(_browse(look))
-    Image.open(IMAGES / "viewer.png").convert("RGB").quantize(128).save(IMAGES / "viewer.png", optimize=True)
-
-
 def vilad_speed() -> None:
     """Fig. 17 on this machine."""
     script = ROOT / "benchmarks" / "vilad_speed.py"
@@ -114,8 +107,8 @@ def vilad_speed() -> None:
 PICTURES: dict[str, tuple[Callable[[], None], tuple[str, ...]]] = {
     "overtake": (overtake, ("overtake.webp",)),
     "trip": (trip, ("trip.png",)),
-    "cabin": (cabin, ("cabin.png",)),
     "viewer": (viewer, ("viewer.png",)),
+    "cabin": (cabin, ("cabin.png",)),
     "unmasking": (unmasking, ("unmasking.svg", "unmasking-drive.svg")),
     "vilad-speed": (vilad_speed, ("vilad-speed.svg",)),
 }
@@ -128,7 +121,7 @@ def _chauffeur(*words: object) -> None:
 
 async def _browse(look: Callable[[Tab], object]) -> None:
     with tempfile.TemporaryDirectory() as profile:
-        async with browser(Path(profile), "--hide-scrollbars") as tab:
+        async with browser(Path(profile)) as tab:
             await look(tab)  # type: ignore[misc]
 
 

@@ -52,7 +52,9 @@ def _slow(names: Iterable[str], *slow: str) -> list[Any]:
     return [pytest.param(one, marks=pytest.mark.slow) if one in slow else one for one in names]
 
 
-@pytest.mark.parametrize("name", _slow(["", *sorted({*chauffeur.__all__} - {"__version__"})], "run_benchmark"))
+@pytest.mark.parametrize(
+    "name", _slow(["", *sorted({*chauffeur.__all__} - {"__version__"})], "evaluate", "run_benchmark")
+)
 def test_every_name_has_an_example_that_runs(name: str, tmp_path: Path) -> None:
     known = {"chauffeur": chauffeur, "asyncio": asyncio, "folder": tmp_path}
     found = getattr(chauffeur, name) if name else chauffeur

@@ -100,7 +100,7 @@ def benchmark(
     from chauffeur.bench.kernel.conformance import check_benchmark
     from chauffeur.concept.registry import plugin_at
 
-    given = _options(option or [])
+    given = read_options(option or [])
     own = ":" in name
     _tell(check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given)))
 
@@ -120,7 +120,7 @@ def api(
     _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
 
 
-def _options(given: list[str]) -> dict[str, Any]:
+def read_options(given: list[str]) -> dict[str, Any]:
     """Options of a benchmark: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
     found: dict[str, Any] = {}
     for text in given:
