@@ -21,10 +21,10 @@ from typing import Any
 from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
 from chauffeur.bench.kernel.report import fill, markdown
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.metrics import ORIGIN, points
 from chauffeur.bench.lampilot.report import FAMILY_TABLE
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, PlanRequest, Scenario, SystemMessage
+from chauffeur.driving.judge.metrics import ORIGIN, points
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -13,9 +13,9 @@ import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS
+from chauffeur.driving.judge.metrics import points
 from chauffeur.worlds.highway.dblv1 import load_dataset
 
 COLUMNS = {

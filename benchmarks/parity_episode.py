@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import Scenario
+from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.core import layout as at
 from highway_oracle import ReferenceWorld

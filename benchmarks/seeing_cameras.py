@@ -17,13 +17,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from chauffeur.bench.lampilot.metrics import ORIGIN, points
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.camera import make_renderer
 from chauffeur.concept import LAMPILOT_LIMITS, Context, Instruction, PlanRequest, Scenario, SystemMessage
 from chauffeur.describe.traffic import describe_with_traffic
 from chauffeur.describe.vision import CameraDescriptor, SceneAnswers
 from chauffeur.driving.episode import make_world
+from chauffeur.driving.judge.metrics import ORIGIN, points
 from chauffeur.models.bev_llm.seeing import BevLlmReader
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner

@@ -4,7 +4,7 @@
     python benchmarks/vilad_readers.py --seed 77       # other commands and scenes
 
 Success is judged by the solver that stands behind every row, so rows differ in how words are read and in nothing else.
-The first row reads nothing: it is what a scene gives away. Some four CPU minutes; the extra is `chauffeur[models]`.
+The first row reads nothing: it is what a scene gives away. Some four CPU minutes; the extra is `chauffeur-lab[models]`.
 """
 
 from __future__ import annotations

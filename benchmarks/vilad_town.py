@@ -19,10 +19,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.referees import RED_S
 from chauffeur.concept import Instruction, Limits, PlanRequest, Scenario, Street, SystemMessage, Trajectory
 from chauffeur.describe.dispatch import describe
 from chauffeur.driving.episode import drive_policy
+from chauffeur.driving.judge.choice import RED_S
 from chauffeur.driving.planning import checked
 from chauffeur.geometry import Pose
 from chauffeur.models.vilad.driving_words import drive_command

@@ -19,7 +19,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.lampilot.goals import answered_rightly
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.rollout import RolloutJob, plan_adapter, roll_out
 from chauffeur.bench.passengers import PassengerRequests
@@ -27,6 +26,7 @@ from chauffeur.bench.passengers.loader import PassengerWish, load_wishes, parse_
 from chauffeur.concept import LAMPILOT_LIMITS, Context, Plan
 from chauffeur.describe import describe
 from chauffeur.driving.episode import make_world
+from chauffeur.driving.judge.goals import answered_rightly
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Item

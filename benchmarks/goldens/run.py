@@ -30,11 +30,11 @@ from typing import Any, Final
 
 from chauffeur.api import run_benchmark
 from chauffeur.bench.kernel.benchmark import make_benchmark
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import ChauffeurError, Context, Instruction, Limits, PersonId, Plan, Policy, Scenario
 from chauffeur.concept.data import read_data
 from chauffeur.describe import describe
 from chauffeur.driving.episode import make_world
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session
 from chauffeur.planners.registry import make_planner

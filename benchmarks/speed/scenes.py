@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, Instruction, PlanRequest, Program, Scenario
+from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.prompts import build_system_message
 from chauffeur.programs.gate import check_source

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from chauffeur.bench.lampilot import rollout
-from chauffeur.bench.lampilot.referee import LampilotReferee
+from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.programs import executor
 from chauffeur.programs.binding import DrivingApis
 from chauffeur.programs.sandbox import Sandbox, SandboxRun

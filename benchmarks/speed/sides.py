@@ -16,10 +16,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import Command, Observation, Scenario
 from chauffeur.driving.episode import run_episode
+from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.programs.gate import _judged
 from chauffeur.programs.rewrite import _prepared
 from chauffeur.worlds.highway import HighwayWorld

@@ -6,25 +6,25 @@ In a notebook, whose cells stand in a running event loop, everything here works 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from chauffeur.bench.kernel.benchmark import make_benchmark
-from chauffeur.bench.kernel.progress import Standing
-from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario
+from chauffeur.concept.lab import needs_lab
 from chauffeur.driving import event_loop
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import write_trip
 from chauffeur.driving.scenarios import find, planner_for, suiting
 from chauffeur.driving.session import Forgetful, Session, parse_wish
-from chauffeur.hmi.notebook import Drive, Rows
+from chauffeur.hmi.notebook import Drive
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.personal_limits import personal_limits
 from chauffeur.planners.base import Answerer, Planner
-from chauffeur.planners.registry import make_answerer, make_planner
+from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
+
+if TYPE_CHECKING:
+    from chauffeur.bench.notebook import Rows
 
 
 def drive(
@@ -137,15 +137,11 @@ def run_benchmark(
         One row an item, as `results.jsonl` has them, and as a table (`.frame()`).
 
     Raises:
+        MissingExtraError: `chauffeur-lab` is not installed.
         ConfigError: There is no such benchmark, planner or option, or the folder holds another run.
         ChauffeurError: The run cannot go on; what is finished stays.
     """
-    benchmark = make_benchmark(name, **options)
-    make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
-    asked = make(planner) if make is not None and isinstance(planner, str) else planner
-    run = BenchRun(Path(out), benchmark, None if make is None or isinstance(asked, str) else asked)
-    return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
+    needs_lab("A benchmark")
+    from chauffeur.bench.notebook import run_named
 
-
-def _unwatched(standing: Standing) -> None:
-    del standing
+    return run_named(name, planner, out=Path(out), workers=workers, **options)

@@ -15,17 +15,17 @@ from typing import Any
 
 import pytest
 import work
-from small_run import FAST, finish, make_data, make_run, outcome, recorded
 
 from chauffeur.bench.kernel.cluster import RayEngine
 from chauffeur.bench.kernel.engine import WorkerLostError
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.concept import ConfigError, MissingExtraError
+from small_run import FAST, finish, make_data, make_run, outcome, recorded
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.server,
-    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'chauffeur[cluster]'"),
+    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'chauffeur-lab[cluster]'"),
 ]
 
 

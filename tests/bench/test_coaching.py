@@ -19,11 +19,11 @@ from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, PersonCrit
 from chauffeur.bench.lampilot.description import usable_description
 from chauffeur.bench.lampilot.policy_aid import PolicyAid, aid_for
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
 from chauffeur.driving.again import drive_again
 from chauffeur.driving.episode import drive_policy, make_world, trip_s
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.planning import Planned, declined
 from chauffeur.driving.recording import RecordedTrip, compare_trips, read_trip, write_trip
 from chauffeur.driving.trips import make_trip

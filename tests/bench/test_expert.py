@@ -11,10 +11,10 @@ import pytest
 
 from chauffeur.bench.lampilot.expert import expert_program, variants
 from chauffeur.bench.lampilot.expert.programs import PROGRAMS, SPREAD, TUNED, open_names
-from chauffeur.bench.lampilot.metrics import points
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, Scenario, ScenarioError, Thoughts
 from chauffeur.driving.episode import drive_program
+from chauffeur.driving.judge.lampilot import LampilotReferee
+from chauffeur.driving.judge.metrics import points
 from chauffeur.programs import UNHURRIED, Sandbox, check_source
 from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small_run import Inline, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.hostile import (
@@ -39,6 +38,7 @@ from chauffeur.language.letters import clean
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.programs.gate import check_source
 from chauffeur.worlds.highway import HighwayWorld
+from small_run import Inline, quiet
 
 ATTACKS, HARMLESS = hostile_inputs(), lookalikes()
 LIMITS = Limits()

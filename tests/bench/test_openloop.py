@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from coached_data import server_module
 from openloop_data import EFFORT, ROTATION, SCENES, Scripted, write_nuscenes
-from small_run import quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.conformance import faults
@@ -23,11 +22,13 @@ from chauffeur.bench.openloop.benchmark import TABLE_XII, errors_of
 from chauffeur.bench.openloop.conventions import CONVENTIONS, L2Errors, errors, fails, standing
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity, kind_of
 from chauffeur.bench.openloop.nuscenes import NuScenesTables
-from chauffeur.bench.openloop.requests import THOUGHTS, context_of, read_context, training_lines, waypoints_text
-from chauffeur.bench.openloop.waypoint_parser import read_waypoints
+from chauffeur.bench.openloop.requests import THOUGHTS, context_of, training_lines
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.foreign.waypoints import read_waypoints
+from chauffeur.planners.prompts.waypoints import read_motion, waypoints_text
 from chauffeur.planners.registry import make_answerer
+from small_run import quiet
 
 PATH = np.array([[4.0, 0.1], [8.0, 0.2], [12.0, -0.3], [16.0, 0.4], [20.0, 0.5], [24.0, 0.6]])
 
@@ -38,7 +39,7 @@ def run(folder: Path, who: Any, **options: Any) -> tuple[BenchRun, list[dict[str
 
 
 def straight_on(text: str) -> str:
-    history, _ = read_context(text.partition("\n")[2] if text.startswith("You drive") else text)
+    history, _ = read_motion(text.partition("\n")[2] if text.startswith("You drive") else text)
     return waypoints_text(constant_velocity(history))
 
 
@@ -342,7 +343,7 @@ def test_the_fine_tuning_lines_are_what_the_sft_setting_asks(tmp_path: Path) -> 
     asked, answer = line["messages"]
     assert asked["content"][1]["text"] == who.seen[0][-1]["content"][-1]["text"]
     assert np.allclose(read_waypoints(answer["content"]), bench.samples[0].future, atol=0.01)
-    history, said = read_context(context_of(bench.samples[0]))
+    history, said = read_motion(context_of(bench.samples[0]))
     assert np.allclose(history, bench.samples[0].history, atol=0.01) and said == "go straight"
 
 

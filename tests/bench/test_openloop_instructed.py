@@ -12,7 +12,6 @@ import openloop_data
 import pytest
 from coached_data import server_module
 from openloop_data import EFFORT, Scripted, circle, straight, write_nuscenes
-from small_run import quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.conformance import faults
@@ -22,10 +21,12 @@ from chauffeur.bench.openloop.doscenes import SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.instructed import HISTORY_ONLY, MODEL, STEPS, InstructedBenchmark
 from chauffeur.bench.openloop.nuscenes import NuScenesTables
-from chauffeur.bench.openloop.requests import question, read_context, waypoints_text
-from chauffeur.bench.openloop.waypoint_parser import read_waypoints
+from chauffeur.bench.openloop.requests import question
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.foreign.waypoints import read_waypoints
+from chauffeur.planners.prompts.waypoints import read_motion, waypoints_text
+from small_run import quiet
 
 HEAD = "Scene Number,Instruction Type,Instruction\n"
 SAYS = "The passenger says: "
@@ -88,7 +89,7 @@ def told(text: str) -> str:
 
 def obedient(text: str) -> str:
     """Straight on, or along the circle that the words name."""
-    history, _ = read_context(text)
+    history, _ = read_motion(text)
     ahead = constant_velocity(history, STEPS)
     radius = next((radius for side, radius in CALLED.items() if side in told(text)), None)
     if radius is not None:
@@ -97,7 +98,7 @@ def obedient(text: str) -> str:
 
 
 def deaf(text: str) -> str:
-    return waypoints_text(constant_velocity(read_context(text)[0], STEPS))
+    return waypoints_text(constant_velocity(read_motion(text)[0], STEPS))
 
 
 # The annotations ------------------------------------------------------------------------------------------------------

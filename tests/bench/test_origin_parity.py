@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS
+from chauffeur.driving.judge.metrics import points
 from chauffeur.worlds.highway.dblv1 import load_dataset
 
 COLUMNS = {

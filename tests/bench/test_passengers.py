@@ -13,11 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small_run import Inline, quiet
 
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
-from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee, feasible, impossible, start_of
@@ -27,8 +25,10 @@ from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Observation
 from chauffeur.describe import describe
 from chauffeur.driving.episode import drive_without_program
+from chauffeur.driving.judge.goals import make_goal
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
+from small_run import Inline, quiet
 
 WISHES = load_wishes()
 DRIVES = [wish for wish in WISHES if wish.right == "drive"]

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from chauffeur.bench.lampilot.expert import expert_program, variants
-from chauffeur.bench.lampilot.metrics import points
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rehearse import OriginJudge, candidates, rehearsed
 from chauffeur.concept import Metric, Outcome, Scenario
 from chauffeur.driving.episode import drive_program
+from chauffeur.driving.judge.lampilot import LampilotReferee
+from chauffeur.driving.judge.metrics import points
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 

@@ -11,14 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_folders import HOSTILE, mixed, outcome, read_lines, signals, write_lines, write_run
-from small_run import Inline, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.metrics import missed
 from chauffeur.bench.kernel.report import ResultTable, fill, value_text
 from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.lampilot.metrics import driving_score
 from chauffeur.bench.lampilot.report import SCORE_TABLE, TABLES
 from chauffeur.bench.report.build import Choices, build_report, read_runs
 from chauffeur.bench.report.gallery import choose
@@ -27,6 +24,9 @@ from chauffeur.bench.report.runs import benchmark_kind, load_run, load_runs, on_
 from chauffeur.bench.report.text import render_markdown
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.driving.judge.metrics import driving_score
+from report_folders import HOSTILE, mixed, outcome, read_lines, signals, write_lines, write_run
+from small_run import Inline, quiet
 
 PAPER = "lampilot-paper-v1"
 

@@ -6,17 +6,17 @@ import importlib.util
 from pathlib import Path
 
 import pytest
-from report_folders import HOSTILE, mixed, outcome, write_run
 
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.report import COMPLETION, SCORE_TABLE
 from chauffeur.bench.report.inspect_log import FORMATS, log_content, write_inspect_log
 from chauffeur.bench.report.runs import Run, load_run
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
+from report_folders import HOSTILE, mixed, outcome, write_run
 
 INSTALLED = importlib.util.find_spec("inspect_ai") is not None
 needs_inspect = pytest.mark.skipif(
-    not INSTALLED, reason='Inspect AI is not installed: pip install "chauffeur[inspect]"'
+    not INSTALLED, reason='Inspect AI is not installed: pip install "chauffeur-lab[inspect]"'
 )
 
 

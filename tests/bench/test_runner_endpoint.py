@@ -15,15 +15,16 @@ from typing import Any
 
 import pytest
 from coached_data import server_module
-from small_run import COMMANDS, FAST, LEFT, SEEDS, Inline, make_data, make_run, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.budget import Price, SpendingBudget
 from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.report.runs import load_run
 from chauffeur.cli.main import app
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 from processes import started, until
+from small_run import COMMANDS, FAST, LEFT, SEEDS, Inline, make_data, make_run, quiet
 
 pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.timeout(1200)]
 
@@ -239,3 +240,39 @@ def test_a_run_stopped_with_calls_in_flight_asks_for_nothing_twice(
     rows = _rows(out)
     assert len(rows) == len(asked) and not any(row["infra_failed"] for row in rows)
     assert {row["command"] for row in rows if row["success"]} == set(COMMANDS)
+
+
+def test_the_conversation_of_an_item_is_kept_with_its_repair(tmp_path: Path, server: Any, few: Dataset) -> None:
+    server.script(
+        MODEL.whole("Thoughts: Up.\n\n```python\ndef go():\n    fly()\n    yield autopilot()\n```\n"), Endpoint()
+    )
+    make_run(tmp_path / "run", few, "openai/m", items=2, planner=_planner(server)).run(
+        quiet, Effort(engine=Inline, concurrency=1)
+    )
+    run = load_run(tmp_path / "run")
+    systems = run.stage("systems", "sha256")
+    assert len(systems) == 1, "both items were told the same, which is stored once"
+    told = [run.turns(answer, systems) for answer in run.stage("generate", "item").values()]
+    roles = sorted(([turn["role"] for turn in turns] for turns in told), key=len)
+    assert roles == [["system", "user", "assistant"], ["system", "user", "assistant", "user", "assistant"]]
+    repaired = max(told, key=len)
+    assert "set_target_lane" in repaired[0]["text"] and any(words in repaired[1]["text"] for words in COMMANDS)
+    assert "fly()" in repaired[2]["text"] and "fly" in repaired[3]["text"] and repaired[4]["text"] == REPLY
+
+
+def test_rows_can_be_read_while_a_run_goes_on(tmp_path: Path, server: Any, few: Dataset) -> None:
+    server.script(Endpoint())
+    folder = tmp_path / "run"
+    seen: list[tuple[str, int]] = []
+
+    def watch(standing: Any) -> None:
+        if (folder / "live.jsonl").is_file():
+            run = load_run(folder)
+            seen.append((run.state, run.done))
+
+    run = make_run(folder, few, "openai/m", items=4, planner=_planner(server))
+    rows = run.run(watch, Effort(engine=Inline, concurrency=1))
+    assert seen and {state for state, _ in seen} == {"running"} and seen[-1][1] >= seen[0][1]
+    assert not (folder / "live.jsonl").exists()
+    done = load_run(folder)
+    assert (done.state, list(done.rows)) == ("finished", rows)

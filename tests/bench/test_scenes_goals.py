@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.lampilot.goals import CHANGE_HOLD_S, answered_rightly, make_goal
 from chauffeur.bench.lampilot.report import answers_note
 from chauffeur.bench.lampilot.scenes import Annotation, annotated, load_annotations
 from chauffeur.bench.lampilot.scenes.feasible import feasible, impossible, start_of
 from chauffeur.concept import DataError, Scenario, Setpoints
+from chauffeur.driving.judge.goals import CHANGE_HOLD_S, answered_rightly, make_goal
 from chauffeur.worlds.highway import HighwayWorld, Instant
 from chauffeur.worlds.highway.dblv1 import load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
 from chauffeur.bench.lampilot.scenes.kinds import (
@@ -31,6 +30,7 @@ from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
 from chauffeur.bench.lampilot.scenes.wording_choice import normal
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.driving.judge.goals import make_goal
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN

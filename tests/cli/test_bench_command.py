@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from chauffeur.bench.openloop import OpenLoopBenchmark
-from chauffeur.cli.bench_plugin import command_of
+from chauffeur.cli.lab.bench_plugin import command_of
 from chauffeur.cli.main import app
 from chauffeur.concept.registry import load_plugin
 from chauffeur.worlds.highway.scenarios import BUILT_IN

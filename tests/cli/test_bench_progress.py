@@ -7,7 +7,7 @@ import io
 from rich.console import Console
 
 from chauffeur.bench.kernel.progress import Speedometer, Standing
-from chauffeur.cli.bench_progress import pace_words, shown, state_words
+from chauffeur.cli.lab.bench_progress import pace_words, shown, state_words
 
 BUSY = Standing(
     planned=3136, asked=1300, done=1204, driven=1200, successes=900, collisions=6, failed=4, requests=1310, usd=0.432,

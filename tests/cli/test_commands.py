@@ -17,9 +17,9 @@ import typer
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
-from chauffeur.cli.bench_plugin import BenchGroup, command_of
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
+from chauffeur.cli.lab.bench_plugin import BenchGroup, command_of
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.concept.extras import install_command
@@ -96,7 +96,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
         panels.setdefault(command.rich_help_panel, []).append(name)
     assert {heading: sorted(names) for heading, names in panels.items()} == {
         "Drive": ["drive", "feedback", "me", "talk"],
-        "Look": ["doctor", "replay", "report", "show"],
+        "Look": ["doctor", "plugins", "replay", "report", "show", "what-if"],
         "Measure": ["bench"],
         "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
@@ -185,7 +185,7 @@ def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
     assert result.exit_code == 0, result.output
     for words in (WISH, "Left is free.", "def overtake():", "✓", "simulated drive"):
         assert words in result.output
-    assert result.output.startswith("✓ Done as asked after 4 s"), "what came of it comes first"
+    assert result.output.startswith("✓ Done after 4 s"), "what came of it comes first"
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
 
@@ -201,7 +201,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
         "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
         "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
         "wrong side: “I move to the right lane.”, but it changed lanes to the left",
-        "≠ Done as asked after 4 s, not as explained (simulated drive)",
+        "≠ Done after 4 s, not as explained (simulated drive)",
     ):
         assert words in told, words
 
@@ -218,7 +218,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
     assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in failed["alignment-v1"]
     assert "score 0.00 of 1" in failed["alignment-v1"]
     quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
-    assert quiet.strip() == "≠ Done as asked after 4 s, not as explained (simulated drive)"
+    assert quiet.strip() == "≠ Done after 4 s, not as explained (simulated drive)"
 
 
 def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:
@@ -234,7 +234,7 @@ def test_a_judge_of_explanations_that_breaks_stops_nothing(answers: str, monkeyp
         raise RecursionError
 
     monkeypatch.setattr("chauffeur.safety.faithfulness.check.judge", broken)
-    result = invoke("drive", WISH, "--planner", answers)
+    result = invoke("drive", WISH, "--planner", answers, "--full")
     assert result.exit_code == 0, result.output
     assert "– not compared: the check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
         result.output.split()
@@ -263,8 +263,8 @@ def test_a_changed_recording_is_noticed(driven: Path) -> None:
     write_trip(path, trip, frames, recorded.scenario, final=recorded.final)
     result = invoke("replay", str(path))
     assert result.exit_code == 1
-    assert "tick 4, observation.ego.x_m" in result.output
-    assert "recorded with chauffeur 0.0.1" in result.output
+    assert "in control period 4" in result.output and "observation.ego.x_m" in result.output
+    assert "Recorded with Chauffeur 0.0.1" in result.output
 
 
 def test_a_page_is_rendered_again(driven: Path) -> None:

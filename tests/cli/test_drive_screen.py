@@ -12,11 +12,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.cli.compilation import CompilationNotice
 from chauffeur.cli.parts import planner_named
 from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import Instruction, Limits, Program, Verdict
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session
@@ -38,9 +38,12 @@ def screen(teller: type[Teller], wish: str, name: str, width: int = 80) -> tuple
 def test_the_outcome_comes_first_then_thoughts_and_program_in_the_passengers_units() -> None:
     told, _ = screen(Teller, "Overtake and come back.", "overtake")
     lines = [line.rstrip() for line in told.splitlines()]
-    assert lines[0].startswith("✓ Done as asked after ")
-    assert lines[1].strip().startswith("Past the vehicle ahead, back in the lane where it began, speed ")
-    places = [next(i for i, line in enumerate(lines) if word in line) for word in ("Wish", "Thoughts", "Program")]
+    assert lines[0].startswith("✓ Done after ")
+    account = " ".join(line.strip() for line in lines[1:3])
+    understood = "pass the vehicle ahead, then change back to the original lane"
+    assert account == f"You asked “Overtake and come back.”; I understood: {understood}; done: all of it."
+    assert lines[3].strip().startswith("Past the vehicle ahead, back in the lane where it began, speed ")
+    places = [next(i for i, line in enumerate(lines) if word in line) for word in ("Road", "Thoughts", "Program")]
     assert places == sorted(places)
     assert "def drive():" in told and "def overtake_and_return" not in told
     assert "113 km/h" in told and "m/s" not in told and "seed" not in told and "score" not in told

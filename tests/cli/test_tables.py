@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from chauffeur.cli.tables import show_table
+from chauffeur.cli.lab.tables import show_table
 
 HEADER = ("planner", "success rate", "collision rate", "time efficiency", "speed variance", "driving score")
 LINES = [

@@ -15,14 +15,16 @@ from chauffeur.concept import (
     Outcome,
     Plan,
     Program,
-    Result,
     Thoughts,
     Trip,
     Verdict,
+    WishPart,
     result_of,
 )
-from chauffeur.concept.results import RESULT_LABELS, result_of_stored
+from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import people_speed
+
+DONE, MISSED = WishPart("done", "turn left"), WishPart("not_done", "stop", "the car did not come to a stand")
 
 
 def trip(outcome: Outcome, **changes: Any) -> Trip:
@@ -41,13 +43,14 @@ def undriven(intent: str, offer: str = "") -> Trip:
         (trip("success"), "done"),
         (trip("success", unused=("when it rains",)), "partly done"),
         (trip("ended"), "done"),
+        (trip("success", parts=(DONE, WishPart("not_judged", "wait"))), "partly done"),
         (trip("ended", unused=("and wait",)), "partly done"),
         (trip("ended", plan=Plan(Thoughts(""), Program(""))), "partly done"),
-        (trip("timeout", parts_done=(0, 2)), "not done"),
-        (trip("timeout", parts_done=(1, 2)), "partly done"),
-        (trip("failure", parts_done=(1, 2)), "partly done"),
-        (trip("failure", parts_done=(1, 2), causes=Causes(policy_failed=True)), "failed"),
-        (trip("collision", parts_done=(1, 2)), "failed"),
+        (trip("timeout", parts=(MISSED, MISSED)), "not done"),
+        (trip("timeout", parts=(DONE, MISSED)), "partly done"),
+        (trip("failure", parts=(DONE, MISSED)), "partly done"),
+        (trip("failure", parts=(DONE, MISSED), causes=Causes(policy_failed=True)), "failed"),
+        (trip("collision", parts=(DONE, MISSED)), "failed"),
         (trip("off_road"), "failed"),
         (trip("refused", causes=Causes(refused=True)), "declined"),
         (trip("refused", causes=Causes(policy_failed=True)), "failed"),
@@ -60,7 +63,6 @@ def undriven(intent: str, offer: str = "") -> Trip:
 )
 def test_a_trip_ends_in_one_of_six_words(made: Trip, result: str) -> None:
     assert result_of(made) == result
-    assert set(RESULT_LABELS) == set(Result)
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, DataError, Instruction, Limits, Program, Scenario
 from chauffeur.driving.again import DrivenAgain, drive_again
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import RecordedTrip, compare_trips, read_trip, write_trip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session

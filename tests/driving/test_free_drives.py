@@ -8,7 +8,6 @@ from functools import cache
 
 import pytest
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.cli.parts import planner_named
 from chauffeur.concept import (
     Instruction,
@@ -24,12 +23,13 @@ from chauffeur.concept import (
 )
 from chauffeur.driving.again import drive_again
 from chauffeur.driving.episode import drive_without_program
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.judge.setpoints import GAP_M, SPEED_MPS
 from chauffeur.driving.judge.trace import HELD_S
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
 from chauffeur.driving.session import Session
-from chauffeur.hmi.words import end_words, left_out_words, trip_words
+from chauffeur.hmi.words import account_words, end_words, trip_words
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
@@ -104,7 +104,7 @@ def test_a_lane_that_is_crossed_for_an_instant_is_not_held() -> None:
 """
     recorded = driven("Change to the left lane.", find("overtake"), Fixed(there_and_back, "lane.left"))
     assert recorded.trip.outcome == "failure"
-    assert "lane" in recorded.trip.causes.detail
+    assert "not done: change to the left lane (" in account_words(recorded.trip)
 
 
 def test_a_program_that_still_has_to_come_back_is_waited_for() -> None:
@@ -126,7 +126,7 @@ def test_a_program_that_still_has_to_come_back_is_waited_for() -> None:
 def test_a_speed_that_traffic_does_not_allow_is_not_done() -> None:
     recorded = driven("Drive at 100 km/h.", find("overtake"))
     assert recorded.trip.outcome in ("failure", "timeout")
-    assert "held the car up" in recorded.trip.causes.detail
+    assert "held the car up" in account_words(recorded.trip)
 
 
 def test_a_speed_is_held_within_tolerance() -> None:
@@ -162,7 +162,7 @@ def test_who_says_nothing_of_what_was_understood_claims_nothing() -> None:
 )
 def test_every_advertised_wish_is_done(scenario: Scenario) -> None:
     recorded = driven(scenario.wish, scenario)
-    assert recorded.trip.outcome == "success", (recorded.trip.causes.detail, recorded.trip.plan.intent)
+    assert recorded.trip.outcome == "success", (account_words(recorded.trip), recorded.trip.plan.intent)
     assert all(verdict.passed for verdict in recorded.trip.verdicts)
     assert suiting(scenario.wish).config.get("type") == scenario.config.get("type"), "the wish finds such a road"
 
@@ -275,7 +275,7 @@ def test_a_condition_that_is_not_used_is_named_and_never_ticked(wish: str) -> No
     assert recorded.trip.unused[0] in wish
     sign, label, tone = trip_words(recorded.trip)
     assert sign != "✓" and label.startswith("Partly done") and tone == "neutral"
-    assert recorded.trip.unused[0] in left_out_words(recorded.trip)[0]
+    assert f"not used: “{recorded.trip.unused[0]}”" in account_words(recorded.trip)
 
 
 def test_what_was_told_not_to_be_done_is_not_driven() -> None:

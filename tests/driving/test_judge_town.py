@@ -13,7 +13,6 @@ import pytest
 
 pytest.importorskip("libsumo")
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import (
     NOBODY,
     Instruction,
@@ -29,6 +28,7 @@ from chauffeur.concept import (
 from chauffeur.concept.utterance import Act, Utterance, acts_from_json
 from chauffeur.driving.episode import Referee
 from chauffeur.driving.judge import acts
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.judge.referee import ActsReferee
 from chauffeur.driving.judge.trace import DriveTrace
 from chauffeur.driving.recording import RecordedTrip

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.bench.hostile.rollout import ran_sign
-from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.concept import Limits, Parameters, Program
 from chauffeur.driving.episode import Episode, drive_policy, drive_program, make_world
+from chauffeur.driving.judge.metrics import ANY_STOP_M
 from chauffeur.driving.scenarios import find
 
 TAILGATES = """\

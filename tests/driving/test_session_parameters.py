@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import ChauffeurError, Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.driving import recording
 from chauffeur.driving.again import drive_again
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.recording import RecordedTrip, write_trip
 from chauffeur.driving.scenarios import find
 from chauffeur.driving.session import Session

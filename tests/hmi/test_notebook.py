@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 import chauffeur
+from chauffeur.bench.notebook import Rows
 from chauffeur.concept import MissingExtraError, PersonId
 from chauffeur.driving.session import parse_wish
 from chauffeur.hmi import notebook
-from chauffeur.hmi.notebook import Drive, Rows
+from chauffeur.hmi.notebook import Drive
 from chauffeur.hmi.page import render_page
 
 

@@ -16,8 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_trips import HOSTILE, doubted, guarded, highway_trip, intersection_trip, refused_trip
 
-from chauffeur.concept import DataError, Parameters, RoadGraph
+from chauffeur.concept import DataError, Parameters, ParkingLot, ParkingSpot, Program, RoadGraph
+from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference
 from chauffeur.driving.recording import RecordedTrip
+from chauffeur.geometry.route import Route
 from chauffeur.hmi.page import embed_json, render_page, write_page
 
 
@@ -27,7 +29,7 @@ class Reader(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
         self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.raw: dict[str, list[str]] = {"script": [], "style": [], "title": [], "h1": []}
+        self.raw: dict[str, list[str]] = {"script": [], "style": [], "title": [], "bdi": []}
         self._inside = ""
         self.feed(text)
         self.close()
@@ -116,7 +118,7 @@ def test_hostile_words_are_inert_everywhere() -> None:
     reader = Reader(text)
     assert reader.tags == Reader(render_page(highway_trip(seconds=2.0))).tags, "the words made or ate an element"
     assert payload_of(text)["wish"] == HOSTILE
-    assert reader.raw["h1"] == [HOSTILE]
+    assert reader.raw["bdi"] == [HOSTILE]
     assert HOSTILE in reader.raw["title"][0]
     assert "<img" not in text
 
@@ -131,7 +133,7 @@ def test_embedded_json_gives_back_any_text_and_cannot_leave_its_element(text: st
 
 def test_slots_in_words_are_not_filled() -> None:
     page = render_page(highway_trip(wish="{{data}} {{script}}", seconds=1.0))
-    assert Reader(page).raw["h1"] == ["{{data}} {{script}}"]
+    assert Reader(page).raw["bdi"] == ["{{data}} {{script}}"]
 
 
 @pytest.mark.parametrize(("make", "along"), [(highway_trip, True), (intersection_trip, False)])
@@ -165,7 +167,8 @@ def test_cones_and_crosswalks_are_on_the_page() -> None:
 def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:
     payload = payload_of(highway_page)
     assert payload["intent"] == "overtake.left"
-    assert ["target speed", "118 km/h"] in payload["settings"]  # type: ignore[operator]
+    assert ["target speed", "33.0 m/s (119 km/h)"] in payload["settings"]  # type: ignore[operator]
+    assert payload["outcome"]["account"] == "; I understood: pass on the left; done."  # type: ignore[index]
     assert [v["passed"] for v in payload["verdicts"]] == [True, False, True]  # type: ignore[attr-defined]
     values = [m["value"] for m in payload["metrics"]]  # type: ignore[attr-defined]
     assert values == ["89.4 points", "91.2 points", "66.7 points", "85.3 points", "does not apply"]
@@ -210,7 +213,7 @@ def test_an_explanation_that_does_not_fit_is_told_on_the_page(highway_page: str)
 def test_a_refused_wish_has_a_page_too() -> None:
     payload = payload_of(render_page(refused_trip()))
     assert payload["drive"] is None
-    assert payload["refusal"] == "There is a wall."
+    assert payload["outcome"]["account"] == "; I declined: There is a wall."  # type: ignore[index]
 
 
 def test_a_page_of_half_a_minute_is_below_two_megabytes() -> None:
@@ -225,3 +228,36 @@ def test_writing_leaves_a_whole_file_or_none(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(DataError, match="cannot be written"):
         write_page(tmp_path / "file" / "trip.html", trip)
+
+
+def test_a_map_shows_the_way_the_spot_and_whom_the_words_meant() -> None:
+    silver, bus = Reference("car", colour="silver"), Reference("bus")
+    acts = (Act("stop", place=ActPlace("behind", silver)), Act("wait", when=Condition("until", "passed", bus)))
+    trip = highway_trip(seconds=1.0)
+
+    def drive_of(policy: Any, acts: tuple[Act, ...]) -> Any:
+        plan = replace(trip.trip.plan, policy=policy, acts=acts)
+        return payload_of(render_page(replace(trip, trip=replace(trip.trip, plan=plan))))["drive"]
+
+    named = Program("def f():\n    yield from stand_behind(agent(7))\n    yield from wait_for(agent(9))\n")
+    assert drive_of(named, acts)["meant"] == {"7": "the silver car", "9": "the bus"}
+    assert drive_of(named, acts[:1])["meant"] == {"7": "meant", "9": "meant"}, "which is which is not known"
+    front = trip.frames[0].observation.front
+    assert front is not None
+    ahead = drive_of(Program("def f():\n    yield autopilot()\n"), (Act("pass", target=Reference("car")),))
+    assert ahead["meant"] == {str(front.vehicle): "the car"}
+    assert "way" not in ahead and "ghost" not in ahead
+
+    first = trip.frames[0].observation
+    route = Route(("a-b:1",), 150.0, 400.0)
+    frames = tuple(replace(one, observation=replace(one.observation, route=route)) for one in trip.frames)
+    spot = ParkingSpot("B4", 200.0, 10.0, 0.0, free=True)
+    lot = replace(first, route=route, lot=ParkingLot((spot,), (("exit", 180.0, 0.0),)))
+    frames = (replace(frames[0], observation=lot), *frames[1:])
+    plan = replace(trip.trip.plan, policy=Parameters(10.0, 12.0, 2.0, 0, "B4"), acts=())
+    drive: Any = payload_of(render_page(replace(trip, frames=frames, trip=replace(trip.trip, plan=plan))))["drive"]
+    assert drive["to_go"][0] == pytest.approx(250.0)
+    assert drive["to_go"] == sorted(drive["to_go"], reverse=True) and drive["to_go"][-1] < drive["to_go"][0] - 15.0
+    assert drive["way"][0][:2] == [150.0, 4.0]
+    assert (drive["ghost"]["n"], drive["ghost"]["x"], drive["ghost"]["y"]) == ("B4", 200.0, -10.0)
+    assert [place["n"] for place in drive["places"]] == ["exit"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from sample_trips import OVERTAKE, guarded, highway_trip, intersection_trip
 
-from chauffeur.concept import Causes, Command, Feedback, Lane, Metric, Parameters, Trajectory
+from chauffeur.concept import Causes, Command, Feedback, Lane, Metric, Parameters, RoadGraph, Trajectory
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
@@ -47,8 +47,8 @@ def test_the_inside_of_an_intersection_is_clear() -> None:
     road = draw_road(shot.road, shot.objects, EVERYWHERE)
     inside = [p for line in road.lines for p in line.points_m if max(abs(p[0]), abs(p[1])) < 3.9]
     assert not inside
-    sign = road.stop_signs[0]
-    assert sign.post_m[1] > 4.0, "the post stands to the right of the lane, beside the road"
+    sign = road.signs[0]
+    assert sign.line_m is not None and sign.post_m[1] > 4.0, "the post stands to the right of the lane, beside the road"
     assert math.dist(*sign.line_m) == pytest.approx(3.6)
 
 
@@ -60,6 +60,37 @@ def test_a_crosswalk_is_painted_as_bars_across_the_way_of_those_who_cross() -> N
     assert all(math.dist(*bar) == pytest.approx(3.0) for bar in road.bars_m)
     assert sorted(bar[0][1] for bar in road.bars_m) == pytest.approx([-5.5 + i for i in range(12)])
     assert not draw_road(a_road((straight(0), over)), (), Bounds(100, -10, 180, 10)).bars_m
+
+
+def test_gaps_between_the_lanes_of_a_junction_are_paved_and_a_green_middle_is_not() -> None:
+    def triangle(side_m: float) -> RoadGraph:
+        corners = ((0.0, 0.0), (side_m, 0.0), (side_m / 2.0, side_m * 0.866))
+        ends = zip(corners, (*corners[1:], corners[0]), strict=True)
+        return a_road(replace(a_lane(f"j-{i}:0", pair), junction="j") for i, pair in enumerate(ends))
+
+    small = draw_road(triangle(18.0), (), EVERYWHERE)
+    (island,) = small.islands_m
+    assert all(-1.0 < x < 19.0 and -1.0 < y < 17.0 for x, y in island)
+    assert not draw_road(triangle(80.0), (), EVERYWHERE).islands_m
+
+
+def test_bays_back_to_back_leave_no_wedges_and_reach_under_their_aisle() -> None:
+    def bay(x: float, side: float) -> Lane:
+        middle = (x, side * 4.0)
+        end = (x + 2.9, side * 9.0)
+        return replace(a_lane(f"{x}-{side}:0", (middle, end), width=2.5), kind="parking")
+
+    aisle = replace(a_lane("aisle:0", ((-20.0, 0.0), (40.0, 0.0)), width=6.0), kind="aisle")
+    road = draw_road(a_road((aisle, *(bay(3.0 * i, -1.0) for i in range(6)))), (), EVERYWHERE)
+    assert [surface.kind for surface in road.surfaces][-1] == "aisle", "it is painted over the ends of its bays"
+    assert all(max(y for _, y in s.centre_m) > -3.0 for s in road.surfaces if s.kind == "parking")
+
+
+def test_a_streets_name_stands_on_it_once_in_a_while() -> None:
+    street = replace(a_lane("a-b:0", ((0.0, 0.0), (200.0, 0.0))), street="Park Road")
+    back = replace(a_lane("b-a:0", ((200.0, -4.0), (0.0, -4.0))), street="Park Road")
+    (name,) = draw_road(a_road((street, back)), (), EVERYWHERE).names
+    assert name.text == "Park Road" and name.x_m == pytest.approx(100.0, abs=1.0)
 
 
 def test_a_stretch_of_road_out_of_sight_is_left_out() -> None:
@@ -89,8 +120,8 @@ def test_what_the_shield_did_is_told_in_stretches() -> None:
     ]
     labels = [event.label for event in events_of(trip) if event.kind == "shield"]
     assert len(labels) == 3
-    assert labels[0].startswith("Shield (lane not free, 1.0 s): steering ")
-    assert labels[2].endswith("m/s². Too close to the car 9 m ahead to ask for more.")
+    assert labels[0] == "Shield, 1.0 s: lane not free. The lane is not free: a car is beside."
+    assert labels[2].endswith("Too close to the car 9 m ahead to ask for more.")
 
 
 def test_a_pause_ends_a_stretch_only_if_it_is_long() -> None:

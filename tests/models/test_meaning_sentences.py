@@ -83,7 +83,7 @@ def test_wishes_on_motorways_keep_the_grammar() -> None:
 
 
 def test_sentences_are_the_same_for_the_same_seed() -> None:
-    pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'chauffeur[models]'")
+    pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'chauffeur-lab[models]'")
     from chauffeur.models.meaning.batches import SentenceSource
 
     texts = []

@@ -18,6 +18,7 @@ from chauffeur.driving.scenarios import BUILT_IN
 from chauffeur.geometry import Polyline, RoadGraph
 from chauffeur.worlds.conformance import MakeWorld, check_world
 from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.route import RouteWorld
 
 SCENES = {scenario.id: scenario for scenario in BUILT_IN}
 
@@ -119,3 +120,17 @@ class _Broken(HighwayWorld):
 def test_what_breaks_it_is_found_and_named(world: type[HighwayWorld], check: str, says: str) -> None:
     found = faults(world, SCENES["overtake"])[check]
     assert any(says in fault for fault in found), found
+
+
+class TestARoute(WorldContract):
+    @pytest.fixture
+    def tried(self) -> tuple[MakeWorld, Scenario]:
+        way = [[-20.0, 0.0], [50.0, 0.0], [100.0, 10.0], [200.0, 60.0]]
+        config = {"route": way, "speed_mps": 8.0, "agents": [{"x_m": 60.0, "y_m": 2.0, "speed_mps": 3.0}]}
+        return RouteWorld, Scenario("a-route", "route", config, 0)
+
+
+@pytest.mark.parametrize("route", [[[0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0]], [[0.0, float("nan")], [1.0, 0.0]], "road"])
+def test_a_route_that_leads_nowhere_is_refused(route: object) -> None:
+    with pytest.raises(ScenarioError):
+        RouteWorld().reset(Scenario("none", "route", {"route": route}, 0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,6 +11,7 @@ import typer
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
 from chauffeur.concept import ConfigError
+from chauffeur.concept.lab import needs_lab
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
@@ -60,17 +60,12 @@ def planner(
 
     It is asked some twenty times. Exit code 1 where a check finds something.
     """
-    from chauffeur.cli.bench_run import planner_options
+    from chauffeur.cli.parts import planner_options
     from chauffeur.driving.conformance import check_planner
-    from chauffeur.planners.registry import make_planner, planner_from
+    from chauffeur.planners.registry import make_planner
 
     options = planner_options(name, base_url)
-    module, _, argument = name.partition("/")
-    if ":" in module:
-        asked = planner_from(_named(module), module, argument, **options)
-    else:
-        asked = make_planner(name, **options)
-    _tell(check_planner(asked))
+    _tell(check_planner(make_planner(name, **options)))
 
 
 @check_app.command(epilog=EXAMPLES)
@@ -83,10 +78,10 @@ def executor(
 
     Exit code 1 where a check finds something.
     """
-    from chauffeur.concept.registry import made
+    from chauffeur.concept.registry import made, plugin_at
     from chauffeur.driving.conformance import check_executor
 
-    tried = _named(policy)
+    tried = plugin_at(policy)
     tried = made("policy", policy, tried) if isinstance(tried, type) or not hasattr(tried, "kind") else tried
     _tell(check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0)))
 
@@ -100,12 +95,29 @@ def benchmark(
 
     Exit code 1 where a check finds something.
     """
+    needs_lab("Checking a benchmark")
     from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
+    from chauffeur.concept.registry import plugin_at
 
     given = _options(option or [])
     own = ":" in name
-    _tell(check_benchmark(benchmark_from(_named(name), name, **given) if own else make_benchmark(name, **given)))
+    _tell(check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given)))
+
+
+@check_app.command(epilog=EXAMPLES)
+def api(
+    name: Annotated[str, typer.Argument(metavar="API", help="A registered driving API, or MODULE:NAME.")],
+) -> None:
+    """Ask a driving API of your own on a motorway and at a crossing: its shape, answers, repetition and time.
+
+    Exit code 1 where a check finds something.
+    """
+    from chauffeur.concept.registry import load_plugin, plugin_at
+    from chauffeur.driving.conformance import check_api
+    from chauffeur.programs.catalogue import GROUP
+
+    _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
 
 
 def _options(given: list[str]) -> dict[str, Any]:
@@ -141,38 +153,11 @@ def _tell(findings: Sequence[ConformanceFinding]) -> None:
         raise typer.Exit(FAILED)
 
 
-def _module(name: str) -> ModuleType:
-    """A module by its name, found as `python -m` finds it. Raises ConfigError."""
-    import importlib
-    import os
-    import sys
-
-    from chauffeur.concept import ConfigError
-
-    if os.getcwd() not in sys.path:  # noqa: PTH109 - where the person stands, as `python -m` has it
-        sys.path.insert(0, os.getcwd())  # noqa: PTH109
-    try:
-        return importlib.import_module(name)
-    except (ImportError, ValueError, TypeError) as error:
-        raise ConfigError(f"The module {name!r} cannot be loaded: {error}.", hint="Check its name.") from error
-
-
-def _named(name: str) -> Any:
-    """What `module:NAME` names. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
-
-    module_name, _, own = name.partition(":")
-    module = _module(module_name)
-    if not own or not hasattr(module, own):
-        raise ConfigError(f"{module_name} has no {own!r}.", hint="Say MODULE:NAME.")
-    return getattr(module, own)
-
-
 def _maker(kind: str, name: str) -> Callable[..., Any]:
     """The class or function at `module:NAME`: a check makes several of its kind. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
+    from chauffeur.concept.registry import plugin_at
 
-    found = _named(name)
+    found = plugin_at(name)
     if not callable(found):
         raise ConfigError(f"{name!r} is a {type(found).__name__}, and makes no {kind}.", hint="Name its class.")
     return found
@@ -180,15 +165,14 @@ def _maker(kind: str, name: str) -> Callable[..., Any]:
 
 def _world_class(name: str) -> Callable[[], Any]:
     """What makes the world at `module:NAME`, the only one of a module, or a registered one. Raises ConfigError."""
-    from chauffeur.concept import ConfigError
-    from chauffeur.concept.registry import load_plugin, plugin_names
+    from chauffeur.concept.registry import load_plugin, module_at, plugin_names
 
     module_name, _, class_name = name.partition(":")
     if not class_name and module_name in plugin_names("chauffeur.worlds"):
         return load_plugin("chauffeur.worlds", module_name)
     if class_name:
         return _maker("world", name)
-    module = _module(module_name)
+    module = module_at(module_name)
     own = [
         one
         for one in vars(module).values()

@@ -13,7 +13,8 @@ from importlib.metadata import PackageNotFoundError, requires, version
 
 import typer
 
-from chauffeur.concept.extras import install_command
+from chauffeur.concept.extras import LAB, install_command
+from chauffeur.concept.lab import has_lab
 
 EXAMPLES = """
 Examples:
@@ -22,7 +23,8 @@ Examples:
 """
 
 _PURPOSES = {
-    "models": "training and running our own models",
+    "models": "training our own models",
+    "transformers": "open models in this process",
     "speech": "speaking to the car",
     "town": "the town world (SUMO)",
     "carla": "the CARLA world",
@@ -67,7 +69,10 @@ def doctor() -> None:
     console.print(columns(rows))
 
     console.print("\nExtras", style="bold")
-    lines: list[tuple[str, Text]] = []
+    lab = good if has_lab() else optional
+    lines: list[tuple[str, Text]] = [("lab", Text.assemble("benchmarks and training: ", lab))]
+    if not has_lab():
+        lines.append(("", Text(install_command(), "cyan")))
     for extra, parts in extras.items():
         absent = [part.name for part in parts if part.installed is None]
         state = good if not absent else Text.assemble(optional, f": {', '.join(absent)}")
@@ -121,10 +126,10 @@ def _realtime() -> str:
 
 
 def installed_parts() -> tuple[tuple[DoctorPart, ...], dict[str, tuple[DoctorPart, ...]]]:
-    """(what the core needs, what each extra needs), read from the package's own metadata; nothing is imported."""
+    """(what the core needs, what each extra needs), read from the packages' metadata; nothing is imported."""
     core: list[DoctorPart] = []
     extras: dict[str, list[DoctorPart]] = {}
-    for line in requires("chauffeur") or ():
+    for line in (*(requires("chauffeur") or ()), *_of_the_lab()):
         found = _REQUIREMENT.match(line)
         if found is None:
             continue
@@ -135,6 +140,14 @@ def installed_parts() -> tuple[tuple[DoctorPart, ...], dict[str, tuple[DoctorPar
         elif extra.group(1) not in _DEVELOPMENT:
             extras.setdefault(extra.group(1), []).append(part)
     return tuple(core), {name: tuple(parts) for name, parts in extras.items()}
+
+
+def _of_the_lab() -> list[str]:
+    """Requirements of the lab's extras; none where it is not installed."""
+    try:
+        return [line for line in requires(LAB) or () if _EXTRA.search(line)]
+    except PackageNotFoundError:
+        return []
 
 
 def _installed(name: str) -> str | None:
@@ -167,7 +180,7 @@ def _settings() -> list[tuple[str, str]]:
         for name, otherwise in (
             ("CHAUFFEUR_BASE_URL", "OpenAI's own endpoint, unless --base-url says otherwise"),
             ("CHAUFFEUR_LAMPILOT", "LaMPilot's samples need --data DIR"),
-            ("CHAUFFEUR_DATA", "training and benchmarks read `data/` of a source checkout"),
+            ("CHAUFFEUR_DATA", "benchmarks and training read the data sets that came with the lab"),
         )
     ]
     rows.append(("processors", str(os.cpu_count() or 1)))

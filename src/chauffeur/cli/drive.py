@@ -78,7 +78,6 @@ def drive(
     from contextlib import ExitStack
     from dataclasses import replace
 
-    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.compilation import CompilationNotice
     from chauffeur.cli.console import stdout
@@ -94,6 +93,7 @@ def drive(
     from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId, Result, result_of
     from chauffeur.driving.events import told_to
+    from chauffeur.driving.judge.choice import referee_for
     from chauffeur.driving.recorder import with_head
     from chauffeur.driving.scenarios import find, planner_for, suiting
     from chauffeur.driving.session import Forgetful, Session, parse_wish

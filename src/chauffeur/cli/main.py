@@ -8,12 +8,9 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
     camera,
-    coach,
-    coach_town,
     context,
     doctor,
     drive,
@@ -21,19 +18,15 @@ from chauffeur.cli import (
     hear,
     meaning,
     page,
+    plugins,
     policies,
     replay,
-    report,
     scenarios,
-    scenes,
-    scenes_frames,
     talk,
-    train,
     unmasking,
+    what_if,
 )
-from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
-from chauffeur.cli.bench import bench_app
 from chauffeur.cli.check import check_app
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
@@ -41,16 +34,13 @@ from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.concept.lab import LAB_COMMANDS, has_lab, needs_lab
 from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.version import __version__
 
 EXAMPLES = help_text("main")
 
 SHOW_EXAMPLES = help_text("main SHOW_EXAMPLES")
-
-BENCH_EXAMPLES = help_text("main BENCH_EXAMPLES")
-
-MODEL_EXAMPLES = help_text("main MODEL_EXAMPLES")
 
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
 """What somebody comes for; the headings of `chauffeur --help`."""
@@ -66,6 +56,12 @@ class ChauffeurGroup(FriendlyGroup):
         """Names of all of them."""
         known = super().list_commands(ctx)
         return [*known, *(name for name in plugin_names(COMMANDS) if name not in known)]
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command; of the lab's it is said how to get them. Raises MissingExtraError."""
+        if args and args[0] in LAB_COMMANDS:
+            needs_lab(f"`chauffeur {args[0]}`")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None where there is none."""
@@ -91,12 +87,6 @@ show_app = typer.Typer(
     help="Show scenarios, driving APIs, policies, the context of a place, a trip's page, what is heard, what is seen.",
     epilog=SHOW_EXAMPLES,
 )
-model_app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    help="Models of our own: train, fine-tune, quantise; and the policies learned from feedback.",
-    epilog=MODEL_EXAMPLES,
-)
 
 
 def _print_version(wanted: bool) -> None:
@@ -120,10 +110,20 @@ app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
 app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 
-app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK)(replay.replay)
-app.command(epilog=report.EXAMPLES, rich_help_panel=LOOK)(report.report)
+app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK, short_help="A recorded trip again, bit for bit.")(
+    replay.replay
+)
+app.command(
+    "what-if",
+    epilog=what_if.EXAMPLES,
+    rich_help_panel=LOOK,
+    short_help="A recorded trip with another planner, side by side.",
+)(what_if.what_if)
 app.add_typer(show_app, name="show", rich_help_panel=LOOK)
-app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK)(doctor.doctor)
+app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK, short_help="Check this installation.")(doctor.doctor)
+app.command(epilog=plugins.EXAMPLES, rich_help_panel=LOOK, short_help="What is installed, and of whom.")(
+    plugins.plugins
+)
 show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 show_app.command(epilog=apis.EXAMPLES)(apis.apis)
 show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
@@ -134,24 +134,15 @@ show_app.command(epilog=camera.EXAMPLES)(camera.camera)
 show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
-app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
-bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
-bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(
-    coach_town.coach_town
-)
-scenes.scenes_app.command(epilog=scenes_frames.FRAMES_EXAMPLES)(scenes_frames.frames)
-scenes.scenes_app.command(epilog=scenes_frames.SFT_EXAMPLES)(scenes_frames.sft)
-bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
+if has_lab():
+    from chauffeur.cli.lab import commands as lab
 
-app.add_typer(model_app, name="model", rich_help_panel=BUILD)
+    lab.mount(app, look=LOOK, measure=MEASURE, build=BUILD)
+
 app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
 app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
 app.add_typer(check_app, name="check", rich_help_panel=BUILD)
-model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
-model_app.command("adapt-vlm", epilog=adapting_vlm.EXAMPLES)(adapting_vlm.adapt_vlm)
-model_app.command("quantise-vlm", epilog=quantising_vlm.EXAMPLES)(quantising_vlm.quantise_vlm)
-model_app.add_typer(policies.policies_app, name="policies")
 
 
 def run() -> None:

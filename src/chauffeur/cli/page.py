@@ -17,6 +17,7 @@ def page(
     out: Annotated[Path | None, typer.Option(help="The page; default beside the recording.")] = None,
     filmstrip: Annotated[Path | None, typer.Option(help="Also write a PNG strip of the drive here.")] = None,
     pictures: Annotated[int, typer.Option(min=1, max=24, help="Pictures in that strip.")] = 6,
+    foxglove: Annotated[Path | None, typer.Option(help="Also write a layout for Foxglove here (JSON).")] = None,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Render a recorded trip as one self-contained HTML page."""
@@ -32,6 +33,11 @@ def page(
         from chauffeur.hmi.filmstrip import write_filmstrip
 
         written.append(("filmstrip", path_text(write_filmstrip(filmstrip, trip, pictures))))
+    if foxglove is not None:
+        from chauffeur.hmi.document import asset
+
+        foxglove.write_text(asset("foxglove-layout.json"), encoding="utf-8")
+        written.append(("Foxglove layout", path_text(foxglove)))
     stdout().print(columns(written, indent=0))
     if browser:
         typer.launch((out or recording.with_suffix(".html")).resolve().as_uri())

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError
+from chauffeur.concept.lab import needs_lab
 
 if TYPE_CHECKING:
     from chauffeur.concept import Context, Observation
@@ -65,6 +66,7 @@ def seeing_named(name: str, seed: int = 0) -> Callable[[Observation], Context] |
         return None
     if kind != "cameras":
         raise ConfigError(f"Unknown way of seeing {name!r}.", hint="Use state, cameras, or cameras/FOLDER.")
+    needs_lab("Seeing by cameras")
     needs("models", "Seeing by cameras", "torch", "transformers", "safetensors")
     from pathlib import Path
 
@@ -94,6 +96,16 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     if on_text is not None and takes_option(spec, "on_text"):
         options["on_text"] = on_text
     return make_planner(spec, **options)
+
+
+def planner_options(spec: str, base_url: str | None) -> dict[str, Any]:
+    """Options of a planner in a benchmark.
+
+    A language model is asked whole replies, which cost less to read than pieces nobody looks at, and does not try again
+    by itself: the run does, which sees what all calls meet.
+    """
+    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
+    return options | {"attempts": 1, "stream": False} if spec.startswith("openai/") else options
 
 
 def engine_named(spec: str) -> AsrEngine | None:

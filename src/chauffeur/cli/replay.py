@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.driving.recording import RecordedTrip
+    from rich.console import Console
+
+    from chauffeur.driving.recording import Difference
 
 EXAMPLES = """
 Examples:
@@ -28,11 +30,12 @@ def replay(
     """
     from rich.text import Text
 
-    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import limits_named
     from chauffeur.driving.again import drive_again
+    from chauffeur.driving.divergence import probable_reasons
+    from chauffeur.driving.judge.choice import referee_for
     from chauffeur.driving.recording import compare_trips, read_trip
     from chauffeur.memory.personal_limits import personal_limits
 
@@ -57,30 +60,26 @@ def replay(
             periods = f"the {held} control periods that can be read; the drive took {seconds:.1f} s"
         console.print(Text.assemble(("The same, bit for bit: ", "bold green"), f"{periods}."))
         return
-    console.print(Text("Not the same. The first difference, recorded against now:", "bold red"))
-    console.print(Text("  ") + plain(str(difference)))
-    for line in other_versions(recorded):
-        console.print(Text("  ") + plain(line))
+    _tell(console, difference, probable_reasons(recorded, difference, done.verdicts))
     raise typer.Exit(FAILED)
 
 
-def other_versions(recorded: RecordedTrip) -> list[str]:
-    """What has changed on this machine since the recording, as far as it could matter."""
-    import platform
+def _tell(console: Console, difference: Difference, reasons: tuple[str, ...]) -> None:
+    from rich.text import Text
 
-    from chauffeur.driving.episode import make_world
-    from chauffeur.version import __version__
+    from chauffeur.cli.console import columns, plain
 
-    changed: list[str] = []
-    for name, then in recorded.trip.record:
-        if name == "python":
-            now = platform.python_version()
-        elif name == "chauffeur":
-            now = __version__
-        elif name == "engine":
-            now = make_world(recorded.scenario).engine
-        else:
-            continue
-        if now != then:
-            changed.append(f"recorded with {name} {then}, now {now}")
-    return changed
+    when = "after the last control period"
+    if difference.tick is not None:
+        when = f"in control period {difference.tick} (at {difference.time_s:.1f} s)"
+    console.print(Text(f"Not the same. The first difference is {when}:", "bold red"))
+    console.print(
+        columns(
+            [
+                ("Quantity", plain(difference.field)),
+                ("Recorded", plain(difference.first)),
+                ("Now", plain(difference.second)),
+                *(("Probably" if not place else "", plain(reason)) for place, reason in enumerate(reasons)),
+            ]
+        )
+    )

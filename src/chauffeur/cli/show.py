@@ -161,28 +161,24 @@ class Teller(Quiet):
         super().end(recorded)
         trip = recorded.trip
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
-        for told in (*words.left_out_words(trip), *self._why_not(trip), words.end_words(trip), shielded):
+        account = f"You asked “{trip.instruction.text}”{words.account_words(trip)}"
+        for told in (account, *self._why_not(trip), words.end_words(trip), shielded):
             if told:
-                self.console.print(Padding(plain(self._units(told)), (0, 0, 0, 2)))
+                self.console.print(Padding(plain(told if told is account else self._units(told)), (0, 0, 0, 2)))
         self.console.print()
         self.console.print(columns(self._rows(recorded)))
 
     def _why_not(self, trip: Trip) -> tuple[str, ...]:
-        """What went wrong; of a wish that was declined the reason and what would do, each once."""
-        causes = words.cause_words(trip.causes)
-        if not trip.causes.refused:
-            return causes
-        if trip.plan.policy is None:
-            return causes
-        remedies = (verdict.remedy for verdict in trip.verdicts if verdict.stops and verdict.remedy)
-        return tuple(dict.fromkeys((*causes, *remedies)))
+        """What went wrong; of a plan that was declined, what would do instead: the reason stands in the account."""
+        if trip.outcome != "refused":
+            return words.cause_words(trip.causes)
+        return tuple(dict.fromkeys(one.remedy for one in trip.verdicts if one.stops and one.remedy))
 
     def _why(self, detail: str) -> None:
         """Told below, in the passenger's units."""
 
     def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
         trip = recorded.trip
-        yield "Wish", Text.assemble("“", plain(trip.instruction.text), "”")
         yield "Road", plain(recorded.scenario.title or recorded.scenario.id)
         if recorded.view is not None and self.console.is_terminal:
             yield "View", seat_view(recorded.view)
@@ -191,36 +187,31 @@ class Teller(Quiet):
         if trip.plan.policy is None or trip.outcome == "refused":
             return
         yield "Thoughts", plain(self._units(trip.plan.thoughts.text.strip()) or "(no reasoning given)")
-        yield trip.plan.policy.kind.replace("_", " ").capitalize(), self._program(trip.plan)
+        if isinstance(trip.plan.policy, Program):  # gains and points are for engineers: --full
+            yield "Program", self._program(trip.plan.policy)
         for at_s, text in trip.said:
             yield "Said", Text.assemble("“", plain(text), "”", (f"  after {at_s:.0f} s", "dim"))
         if trip.verdicts:
             yield "Checks", self._checks(trip.verdicts)
 
-    def _program(self, plan: Plan) -> RenderableType:
-        if not isinstance(plan.policy, Program):
-            return plain(policy_words(plan.policy, self._unit))
-        more = Text("its helper functions: --full", "dim") if plan.policy.library else Text()
-        code = Syntax(plain(plan.policy.source.rstrip("\n")).plain, **_CODE)
-        return Group(code, more) if more else code
+    def _program(self, program: Program) -> RenderableType:
+        code = Syntax(plain(program.source.rstrip("\n")).plain, **_CODE)
+        return Group(code, Text("its helper functions: --full", "dim")) if program.library else code
 
     def _checks(self, verdicts: tuple[Verdict, ...]) -> RenderableType:
-        """Marks side by side, and below them what is not as it should be, or was not compared."""
+        """Marks side by side, and below them what was not compared and what is not as it should be."""
         marks: list[Text] = []
         told: list[RenderableType] = []
-        why: dict[str, None] = {}
         for verdict in verdicts:
-            if verdict.mark not in ("passed", "open", "not_compared"):
+            if verdict.mark in ("passed", "open"):
+                rest = ", not all proven" if verdict.mark == "open" else ""
+                mark = (words.MARKS[verdict.mark], words.MARK_STYLES[verdict.mark])
+                marks.append(Text.assemble(mark, f" {words.check_name(verdict.check)}{rest}", no_wrap=True))
+            elif verdict.mark != "not_compared":
                 told.append(_told(verdict, self._units))
-                continue
-            if verdict.mark == "not_compared":
-                why.setdefault(words.not_compared_words(verdict), None)
-            name = words.check_name(verdict.check)
-            rest = ", not all proven" if verdict.mark == "open" else ""
-            mark = (words.MARKS[verdict.mark], words.MARK_STYLES[verdict.mark])
-            marks.append(Text.assemble(mark, f" {name}{rest}", no_wrap=True))
-        grey = (Text(f"{words.MARKS['not_compared']} {plain(self._units(each)).plain}", "dim") for each in why)
-        return Group(Columns(marks, padding=(0, 3)), *grey, *told)
+        if names := words.not_compared_names(verdicts):
+            told.insert(0, Text(f"{words.MARKS['not_compared']} not compared: {names}", "dim"))
+        return Group(Columns(marks, padding=(0, 3)), *told)
 
     def _units(self, text: str) -> str:
         return words.passenger_units(text, self._unit)

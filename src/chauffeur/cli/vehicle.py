@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli import egodriver
 from chauffeur.cli.examples import WithExamples, help_text
 from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
 
@@ -152,6 +153,7 @@ def watch(
 
 
 vehicle_app.command(epilog=DRIVE_EXAMPLES)(drive)
+vehicle_app.command(epilog=egodriver.EXAMPLES)(egodriver.egodriver)
 
 
 @vehicle_app.command()

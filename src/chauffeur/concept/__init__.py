@@ -40,6 +40,7 @@ from chauffeur.concept.nouns import (
     Parameters,
     ParkingLot,
     ParkingSpot,
+    PartResult,
     PersonId,
     Plan,
     PlanRequest,
@@ -56,10 +57,11 @@ from chauffeur.concept.nouns import (
     Trip,
     Usage,
     Verdict,
+    WishPart,
     lines_before_library,
     mark_of,
 )
-from chauffeur.concept.results import ANSWERED, ASKS, RESULT_LABELS, Result, result_of
+from chauffeur.concept.results import ANSWERED, ASKS, Result, result_of
 from chauffeur.concept.scene import (
     STOP_ZONE_M,
     STOPPED_MPS,
@@ -83,7 +85,6 @@ __all__ = [
     "HELPERS_HEAD",
     "LAMPILOT_LIMITS",
     "NOBODY",
-    "RESULT_LABELS",
     "STOPPED_MPS",
     "STOP_ZONE_M",
     "ActionMatrix",
@@ -123,6 +124,7 @@ __all__ = [
     "Parameters",
     "ParkingLot",
     "ParkingSpot",
+    "PartResult",
     "PersonId",
     "Plan",
     "PlanRequest",
@@ -155,6 +157,7 @@ __all__ = [
     "Usage",
     "VehicleState",
     "Verdict",
+    "WishPart",
     "lines_before_library",
     "mark_of",
     "result_of",

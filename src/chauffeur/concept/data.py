@@ -1,4 +1,4 @@
-"""Where data lie: the user's own, and the data sets of a source checkout, which are no part of the wheel."""
+"""Where data lie: the user's own, and the data sets of the lab, in its wheel or in a source checkout."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.concept.errors import DataError
+from chauffeur.concept.extras import LAB
 
 DATA_VARIABLE: Final = "CHAUFFEUR_DATA"
-"""Environment variable that names a folder of data sets, in place of the checkout's own."""
+"""Environment variable that names a folder of data sets, in place of those that came with the lab."""
 
-_CHECKOUT: Final = Path(__file__).resolve().parents[3]
+_PACKAGE: Final = Path(__file__).resolve().parents[1]
 
 
 def data_home() -> Path:
@@ -25,19 +26,20 @@ def data_home() -> Path:
     return Path.home() / ".local" / "share" / "chauffeur"
 
 
-def data_folder(name: str, environ: Mapping[str, str] = os.environ, checkout: Path = _CHECKOUT) -> Path:
+def data_folder(name: str, environ: Mapping[str, str] = os.environ, package: Path = _PACKAGE) -> Path:
     """Folder of a data set.
 
     Args:
         name: Its name, e.g. `onboard`; `data/README.md` lists them.
         environ: Environment.
-        checkout: Where the sources would lie; an installed package has none there.
+        package: Folder of `chauffeur`: the lab's wheel brings the sets in its `data`, a checkout has them at its root.
 
     Raises:
         DataError: It is not here; says where it was looked for and where to get it.
     """
     given = environ.get(DATA_VARIABLE, "")
-    root = Path(given) if given else checkout / "data"
+    checked_out = (package.parents[1] / "pyproject.toml").is_file()
+    root = Path(given) if given else (package.parents[1] if checked_out else package) / "data"
     if (folder := root / name).is_dir():
         return folder
     if given:
@@ -45,11 +47,11 @@ def data_folder(name: str, environ: Mapping[str, str] = os.environ, checkout: Pa
             f"The data set {name!r} is not in {root}.",
             hint=f"Set {DATA_VARIABLE} to the folder `data` of a source checkout of Chauffeur.",
         )
-    if (checkout / "pyproject.toml").is_file():
+    if checked_out:
         raise DataError(f"The data set {name!r} is not in {root}.", hint="Restore it: git checkout -- data")
     raise DataError(
         f"The data set {name!r} is no part of the installed package.",
-        hint=f"Get Chauffeur's sources and set {DATA_VARIABLE} to their folder `data`.",
+        hint=f"Install {LAB} again, or set {DATA_VARIABLE} to the folder `data` of its sources.",
     )
 
 

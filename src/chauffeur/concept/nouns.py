@@ -627,6 +627,25 @@ reached by the world's own geometry; the learned reading of the words, which the
 it does not; labels by people, over the same geometry."""
 
 
+PartResult = Literal["done", "not_done", "opposite", "not_judged"]
+"""What became of a thing that was asked for; `opposite` is what was not to be done, done."""
+
+
+@dataclass(frozen=True, slots=True)
+class WishPart:
+    """A thing asked for and what became of it.
+
+    Attributes:
+        result: What became of it.
+        words: In plain words, as it was understood: `change to the left lane`; empty where the plan alone names it.
+        why: What is missing, or why it was not compared; empty where it was done.
+    """
+
+    result: PartResult
+    words: str = ""
+    why: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Causes:
     """Why a trip went as it did, apart from its outcome; each flag is counted over all planned trips.
@@ -679,7 +698,7 @@ class Trip:
         said: What the program told the passenger, as (time s, text).
         record: Provenance: versions, hashes, planner and model ids.
         unused: Parts of the wish, as said, that the plan does not use: places, conditions, further acts.
-        parts_done: How many of the things asked for were done, and how many there are; None where nothing was judged.
+        parts: The things asked for and what became of each, in their order; empty where nothing was judged.
         judged_by: Source of what the drive was judged by; empty where nothing was judged.
     """
 
@@ -698,7 +717,7 @@ class Trip:
     said: tuple[tuple[float, str], ...] = ()
     record: tuple[tuple[str, Any], ...] = ()
     unused: tuple[str, ...] = ()
-    parts_done: tuple[int, int] | None = None
+    parts: tuple[WishPart, ...] = ()
     judged_by: JudgedBy | Literal[""] = ""
 
     @property

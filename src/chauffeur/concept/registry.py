@@ -4,10 +4,31 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from importlib.metadata import entry_points
-from typing import Any
+import os
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any, Final
 
 from chauffeur.concept.errors import ChauffeurError, ConfigError
+
+GROUPS: Final = (
+    "chauffeur.worlds",
+    "chauffeur.planners",
+    "chauffeur.executors",
+    "chauffeur.apis",
+    "chauffeur.checks",
+    "chauffeur.benchmarks",
+    "chauffeur.memories",
+    "chauffeur.commands",
+)
+"""Entry-point groups that are read, in the order of the loop."""
+OWN: Final = "chauffeur"
+"""The distribution whose parts are built in."""
 
 
 def plugin_names(group: str) -> tuple[str, ...]:
@@ -32,6 +53,100 @@ def load_plugin(group: str, name: str) -> Any:
         return found[0].load()
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"The {kind} {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error
+
+
+def module_at(name: str) -> ModuleType:
+    """A module by its name, found as `python -m` finds it: the current folder counts. Raises ConfigError."""
+    if os.getcwd() not in sys.path:  # noqa: PTH109 - compared with what stands there as text
+        sys.path.insert(0, os.getcwd())  # noqa: PTH109
+    try:
+        return import_module(name)
+    except (ImportError, ValueError, TypeError) as error:
+        raise ConfigError(f"The module {name!r} cannot be loaded: {error}.", hint="Check its name.") from error
+
+
+def plugin_at(where: str) -> Any:
+    """The object at `module:NAME`. Raises ConfigError: there is no such module, or nothing of that name in it."""
+    module_name, _, name = where.partition(":")
+    module = module_at(module_name)
+    if not name or not hasattr(module, name):
+        raise ConfigError(f"{module_name} has no {name!r}.", hint="Say MODULE:NAME.")
+    return getattr(module, name)
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """An entry point as it is installed; nothing of it is imported.
+
+    Attributes:
+        group: E.g. `chauffeur.planners`.
+        name: As it is called for.
+        where: `module:NAME`.
+        package: The distribution that registers it; empty where its metadata name none.
+        version: Of that distribution.
+        shadowed: Whether another package's entry point of this name is the one that is loaded.
+    """
+
+    group: str
+    name: str
+    where: str
+    package: str
+    version: str
+    shadowed: bool = False
+
+    @property
+    def built_in(self) -> bool:
+        """True if it ships with Chauffeur."""
+        return self.package == OWN
+
+    def fault(self, *, load: bool = False) -> str:
+        """Why it cannot be loaded, in words; empty where nothing speaks against it.
+
+        Args:
+            load: Import it. Otherwise its module is looked for and not run, so that what it needs stays unknown.
+        """
+        if not load:
+            module = self.where.partition(":")[0].strip()
+            return "" if _module_there(module) else f"there is no module {module}"
+        point = EntryPoint(self.name, self.where, self.group)
+        try:
+            point.load()
+        except Exception as error:  # noqa: BLE001 - a third party's module may raise anything
+            return f"{type(error).__name__}: {error}"
+        return ""
+
+
+def plugins() -> tuple[Plugin, ...]:
+    """Everything that is registered in a group of Chauffeur, in the order of `GROUPS`, built-in parts first."""
+    found: dict[tuple[str, str, str, str], Plugin] = {}
+    first: set[tuple[str, str]] = set()
+    everything = entry_points()
+    others = sorted(group for group in everything.groups if group.startswith("chauffeur.") and group not in GROUPS)
+    for group in (*GROUPS, *others):
+        for point in everything.select(group=group):
+            package, version = (point.dist.name, point.dist.version) if point.dist is not None else ("", "")
+            key = (group, point.name, point.value, package)
+            if key not in found:
+                shadowed = (group, point.name) in first
+                found[key] = Plugin(group, point.name, point.value, package, version, shadowed)
+                first.add((group, point.name))
+    order = [*GROUPS, *others]
+    return tuple(sorted(found.values(), key=lambda one: (order.index(one.group), not one.built_in, one.name)))
+
+
+def _module_there(name: str) -> bool:
+    """True if a module can be found; neither it nor the packages above it are run."""
+    top, *below = name.split(".")
+    whole = top
+    try:
+        found = find_spec(top)  # also asks the finders of editable installs
+        for part in below:
+            whole = f"{whole}.{part}"
+            inside = None if found is None else found.submodule_search_locations
+            found = None if inside is None else PathFinder.find_spec(whole, inside)
+    except (ImportError, ValueError):
+        return False
+    return found is not None
 
 
 def made(kind: str, name: str, make: object, *arguments: object, **options: object) -> Any:

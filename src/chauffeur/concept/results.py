@@ -24,19 +24,6 @@ class Result(StrEnum):
     FAILED = "failed"
 
 
-RESULT_LABELS: Final[dict[Result, str]] = {
-    Result.DONE: "Done as asked",
-    Result.PARTLY_DONE: "Partly done",
-    Result.NOT_DONE: "Not done as asked",
-    Result.ASKED_BACK: "Asked back, nothing driven",
-    Result.DECLINED: "Declined, nothing driven",
-    Result.FAILED: "Failed",
-}
-"""A result as a headline."""
-ANSWERED_LABEL: Final = "Answered, nothing driven"
-"""Headline of a question that was answered: done, and nothing was to be driven."""
-
-
 def result_of(trip: Trip) -> Result:
     """What became of a trip's wish: done only where every part that was read has been done and none was left unused."""
     if trip.plan.refusal and trip.plan.policy is None:
@@ -46,16 +33,19 @@ def result_of(trip: Trip) -> Result:
         return Result.FAILED
     if result is Result.DONE and not is_whole(trip):
         return Result.PARTLY_DONE
-    done, of = trip.parts_done or (0, 0)
-    if result is Result.NOT_DONE and trip.outcome in ("failure", "timeout") and 0 < done < of:
+    some = any(part.result == "done" for part in trip.parts)
+    if result is Result.NOT_DONE and trip.outcome in ("failure", "timeout") and some and not _all_done(trip):
         return Result.PARTLY_DONE
     return result
 
 
 def is_whole(trip: Trip) -> bool:
     """Whether nothing of the wish stayed unused, and what was driven had a meaning that is known."""
-    done, of = trip.parts_done or (0, 0)
-    return not trip.unused and done == of and (trip.outcome == "success" or bool(trip.plan.intent))
+    return not trip.unused and _all_done(trip) and (trip.outcome == "success" or bool(trip.plan.intent))
+
+
+def _all_done(trip: Trip) -> bool:
+    return all(part.result == "done" for part in trip.parts)
 
 
 def undriven(intent: str, *, offer: bool = False) -> Result:

@@ -126,6 +126,11 @@ class Sign:
     value: float | None = None
 
 
+def stop_sign_of(thing: VehicleState) -> Sign:
+    """A stop sign that a world shows among its objects: it stands on its lane, where one stops."""
+    return Sign(str(thing.id), "stop", () if thing.lane is None else (thing.lane,), thing.x_m, thing.y_m)
+
+
 @dataclass(frozen=True, slots=True)
 class Observation:
     """A world at one instant; nothing in it changes afterwards.

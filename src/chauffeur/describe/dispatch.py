@@ -115,6 +115,7 @@ DESCRIPTORS: Mapping[str, Callable[[Observation], Context]] = {
     "intersection": describe_intersection,
     "parking": describe_parking,
     "track": describe_track,
+    "street": describe_track,
     "town": describe_town,
 }
 

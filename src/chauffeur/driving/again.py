@@ -1,5 +1,6 @@
-"""A recorded trip driven again. A recording may come from anywhere: its policy passes what a planner's would today.
+"""A recorded trip driven again, with its own policy or another planner's.
 
+A recording may come from anywhere: its policy passes what a planner's would today.
 Checks, safety filter and bounds are today's. Of the recording's own limits only what is stricter counts.
 """
 
@@ -11,12 +12,32 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur.concept import DataError, Limits, Observation, Scenario
+from chauffeur.concept import (
+    Context,
+    DataError,
+    Feedback,
+    History,
+    Instruction,
+    Limits,
+    Observation,
+    PersonId,
+    Scenario,
+    Trip,
+    Verdict,
+)
+from chauffeur.driving import event_loop
 from chauffeur.driving.emergency import not_checked, planned_for
 from chauffeur.driving.episode import drive_policy, make_world, trip_s
+from chauffeur.driving.events import Listener, nobody_listens
 from chauffeur.driving.planning import declined
 from chauffeur.driving.recording import RecordedTrip
-from chauffeur.driving.session import RefereeMaker, check_drive
+from chauffeur.driving.session import (
+    RefereeMaker,
+    Session,
+    check_drive,
+    parse_wish,
+)
+from chauffeur.planners.base import Planner
 from chauffeur.worlds.base import World
 
 _limits = TypeAdapter(Limits)
@@ -32,11 +53,13 @@ class DrivenAgain:
         trip: The drive; None where it was refused.
         refusal: Why, in words.
         notes: What differs between how it was driven and how it is driven now, in words.
+        verdicts: Those of today's checks.
     """
 
     trip: RecordedTrip | None
     refusal: str = ""
     notes: tuple[str, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
 
 
 def drive_again(recorded: RecordedTrip, most: Limits, referee: RefereeMaker) -> DrivenAgain:
@@ -65,7 +88,7 @@ def drive_again(recorded: RecordedTrip, most: Limits, referee: RefereeMaker) -> 
         verdicts = check_drive(trip.plan, observation, limits)
         own = None
     if refusal := declined(trip.plan, verdicts):
-        return DrivenAgain(None, refusal, notes)
+        return DrivenAgain(None, refusal, notes, verdicts)
     if "shield" not in record:
         notes = (*notes, "It was recorded without the safety filter, which drives along today.")
     if own is None and "minimum_speed" not in record:
@@ -82,7 +105,55 @@ def drive_again(recorded: RecordedTrip, most: Limits, referee: RefereeMaker) -> 
         said=episode.said,
     )
     again = replace(recorded, trip=driven, frames=episode.frames, final=episode.final, cut_off=False)
-    return DrivenAgain(again, "", notes)
+    return DrivenAgain(again, "", notes, verdicts)
+
+
+class _AsRemembered:
+    """H as the recording holds it, whoever's it is; nothing is kept of the drive."""
+
+    def __init__(self, history: History) -> None:
+        self._history = history
+
+    def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
+        """The recorded history."""
+        del person, instruction, context, k
+        return self._history
+
+    def remember(self, trip: Trip, feedback: Feedback | None) -> None:
+        """Nothing."""
+        del trip, feedback
+
+
+def drive_otherwise(
+    recorded: RecordedTrip, planner: Planner, most: Limits, referee: RefereeMaker, tell: Listener = nobody_listens
+) -> DrivenAgain:
+    """Drive the recorded situation with another planner: same wish, scenario, seed, history and person's limits.
+
+    The planner is asked anew, with the situation as it is described today. Whatever becomes of the wish is a trip, also
+    that it is declined.
+
+    Args:
+        recorded: The recording; of one that was declined, too.
+        planner: Who plans now.
+        most: Today's limits for whose trip it is.
+        referee: Makes the judge of the trip.
+        tell: Hears the drive.
+
+    Raises:
+        DataError: Its scenario cannot be set up, or it does not say under which limits it was driven.
+        ChauffeurError: No plan could be had.
+    """
+    trip, scenario = recorded.trip, recorded.scenario
+    _reset(make_world(scenario), scenario, trip.seed)
+    limits, notes = _bounds(dict(trip.record).get("limits"), most)
+    began_s = recorded.frames[0].observation.time_s if recorded.frames else 0.0
+    if began_s > 0.0:
+        notes = (*notes, f"It was wished {began_s:.1f} s into a longer drive; now it is driven from the beginning.")
+    said = trip.instruction
+    wish = replace(parse_wish(said.said or said.text, said.person), confirmed=said.confirmed)
+    session = Session(planner, memory=_AsRemembered(trip.history), referee=referee, tell=tell)
+    driven = event_loop.run(session.drive(wish, scenario, trip.seed, limits))
+    return DrivenAgain(driven, "", notes, driven.trip.verdicts)
 
 
 def _reset(world: World, scenario: Scenario, seed: int) -> Observation:

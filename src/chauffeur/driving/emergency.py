@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Alarm, Observation, Parameters, Plan, Program, Thoughts, Verdict
+from chauffeur.control import LAMPILOT_EGO
 from chauffeur.driving.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency, tells_of_alarm
 from chauffeur.language.languages.reader import help_question
@@ -36,23 +37,26 @@ ALARM_WORDS: Final[dict[Alarm, str]] = {"stop": "Stop the car!", "distress": "Th
 
 _STOPPED_MPS: Final = 0.1
 _SLACK_MPS: Final = 0.5
-_FULL_SCALE_MPS2: Final = 30.0
-"""LaMPilot's car-following law on a free road: 30 (1 - (v / v0)^4) m/s2, cut at 5 (control/actuation.py)."""
+_LAW_MPS2: Final[dict[str, float]] = {"highway": 30.0, "intersection": 30.0, "parking": 2.0, "town": 1.8}
+"""Factor a of each kind of road's driver on a free road, a (1 - (v / v0)^4) m/s2, by which a target speed is found that
+brakes as wanted. LaMPilot's is cut at 5 (control/actuation.py), those of lots and towns at 2."""
+_USUAL_LAW_MPS2: Final = LAMPILOT_EGO.acceleration_mps2
+"""The same of every other world (`worlds/over_graph.py`)."""
 _STOPPING_INTENTS: Final = frozenset({"stop", "pull_over", "park"})
 
-_STOP_PROGRAM: Final = f"""def minimal_risk_manoeuvre():
-    # Hazard lights on; keep the lane, and brake with an even {MINIMAL_RISK_BRAKING_MPS2:g} m/s2 to a stand.
+_STOP_PROGRAM: Final = """def minimal_risk_manoeuvre():
+    # Hazard lights on; keep the lane, and brake with an even {braking:g} m/s2 to a stand.
     ego = get_ego_vehicle()
     say("Hazard lights on. I stop in this lane.")
     set_target_lane(get_lane_of(ego))
     set_desired_time_headway(2.0)
     while get_speed_of(ego) > 0.5:
-        set_target_speed(get_speed_of(ego) / (1.0 + {MINIMAL_RISK_BRAKING_MPS2:g} / {_FULL_SCALE_MPS2:g}) ** 0.25)
+        set_target_speed(get_speed_of(ego) / (1.0 + {braking:g} / {law:g}) ** 0.25)
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
 """
-_SAFE_STOP_PROGRAM: Final = f"""def stop_on_the_shoulder():
+_SAFE_STOP_PROGRAM: Final = """def stop_on_the_shoulder():
     # Hazard lights on; lane by lane to the shoulder, which has none to its right, and an even 3 m/s2 to a stand there.
     ego = get_ego_vehicle()
     say("Hazard lights on. I stop on the shoulder.")
@@ -71,7 +75,7 @@ _SAFE_STOP_PROGRAM: Final = f"""def stop_on_the_shoulder():
             yield autopilot()
         right = get_right_lane(ego)
     while get_speed_of(ego) > 0.5:
-        set_target_speed(get_speed_of(ego) / (1.0 + 3.0 / {_FULL_SCALE_MPS2:g}) ** 0.25)
+        set_target_speed(get_speed_of(ego) / (1.0 + 3.0 / {law:g}) ** 0.25)
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
@@ -94,15 +98,20 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
     found = read_emergency(text)
     if found is None or not found.alone:
         return None
+    law = _LAW_MPS2.get(observation.kind, _USUAL_LAW_MPS2)
+    stop = _STOP_PROGRAM.format(braking=MINIMAL_RISK_BRAKING_MPS2, law=law)
     match found.kind:
         case "stop":
-            return _plan(STOPPING, _STOP_PROGRAM, "stop", 0.0)
+            return _plan(STOPPING, stop, "stop", 0.0)
         case "safe_stop" if shoulder_at_right(observation):
             return _plan(
-                "Hazard lights on: I make for the shoulder and stop there.", _SAFE_STOP_PROGRAM, "pull_over", 0.0
+                "Hazard lights on: I make for the shoulder and stop there.",
+                _SAFE_STOP_PROGRAM.format(law=law),
+                "pull_over",
+                0.0,
             )
         case "safe_stop":
-            return _plan(f"There is no shoulder here. {STOPPING}", _STOP_PROGRAM, "stop", 0.0)
+            return _plan(f"There is no shoulder here. {STOPPING}", stop, "stop", 0.0)
         case "ask":
             return Plan(
                 Thoughts(f"“{found.words}”: {question_to(found)}"),

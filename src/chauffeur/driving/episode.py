@@ -30,6 +30,7 @@ from chauffeur.concept import (
     SandboxError,
     Scenario,
     Setpoints,
+    WishPart,
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.driving.actuate import actuate, set_points
@@ -86,19 +87,14 @@ class FollowsPolicy(Protocol):
         """The set-points of a control period, and the program's state, before `observe`."""
         ...
 
-    @property
-    def shortfall(self) -> str:
-        """What is missing, in words; empty when nothing is."""
-        ...
-
 
 @runtime_checkable
 class TellsParts(Protocol):
     """What a referee offers that judges a wish part by part."""
 
     @property
-    def parts_done(self) -> tuple[int, int]:
-        """Parts that are done, and all of them."""
+    def parts(self) -> tuple[WishPart, ...]:
+        """The things asked for and what became of each so far."""
         ...
 
     @property
@@ -121,7 +117,7 @@ class Episode:
         success: The referee's success flag.
         interventions: Control periods in which the shield changed the command.
         bounded: Set-points that were brought within the limits, by name, with the number of control periods.
-        parts_done: Parts of the wish that are done, and all of them; None where nothing was judged.
+        parts: The things asked for and what became of each; empty where nothing was judged.
         judged_by: Source of what the drive was judged by; empty where nothing was judged.
     """
 
@@ -136,7 +132,7 @@ class Episode:
     success: bool
     interventions: int = 0
     bounded: tuple[tuple[str, int], ...] = ()
-    parts_done: tuple[int, int] | None = None
+    parts: tuple[WishPart, ...] = ()
     judged_by: JudgedBy | Literal[""] = ""
 
 
@@ -360,24 +356,30 @@ def run_episode(
                 break
     final = world.observe()
     success = referee is not None and referee.success and failure is None
-    shortfall = follows.shortfall if follows is not None and failure is None else ""
     return Episode(
         frames=tuple(frames),
         final=final,
         ticks=ticks,
         duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
-        causes=_causes(failure, fallback_used=command_source is None or policy is not None)
-        if failure is not None
-        else Causes(detail=shortfall),
+        causes=Causes()
+        if failure is None
+        else _causes(failure, fallback_used=command_source is None or policy is not None),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
         success=success,
         interventions=changed,
         bounded=tuple(bounded.items()),
-        parts_done=None if referee is None else referee.parts_done if isinstance(referee, TellsParts) else (success, 1),
+        parts=_parts(referee, success=success),
         judged_by="" if referee is None else referee.judged_by if isinstance(referee, TellsParts) else "goal",
     )
+
+
+def _parts(referee: Referee | None, *, success: bool) -> tuple[WishPart, ...]:
+    """The things asked for and what became of each; of a judge that knows one goal, that."""
+    if isinstance(referee, TellsParts):
+        return referee.parts
+    return () if referee is None else (WishPart("done" if success else "not_done"),)
 
 
 def _ask(policy: RunningPolicy | None, held: Setpoints) -> PolicyTick:

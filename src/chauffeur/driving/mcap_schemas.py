@@ -166,7 +166,7 @@ TRIP = Channel(
         said=_array(_array({"type": ["number", "string"]}), "[time s, text] pairs"),
         record=_array(_array({}), "[name, value] pairs of provenance"),
         unused=_array(_text(), "Parts of the wish that the plan does not use"),
-        parts_done={"type": ["array", "null"]},
+        parts=_array(_object(result=_text(), words=_text(), why=_text()), "Things asked for, and what became of each"),
         judged_by=_text("words, plan, goal, place, reading, labels, or empty"),
     ),
 )

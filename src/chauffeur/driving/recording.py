@@ -13,7 +13,7 @@ import io
 import json
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -129,12 +129,14 @@ class Difference:
         field: Path of the value, e.g. `observation.ego.speed_mps`.
         first: Value in the first trip, as text.
         second: Value in the second.
+        time_s: Simulated time of that control period.
     """
 
     tick: int | None
     field: str
     first: str
     second: str
+    time_s: float | None = None
 
     def __str__(self) -> str:
         where = "" if self.tick is None else f"tick {self.tick}, "
@@ -188,23 +190,52 @@ def read_trip(path: Path) -> RecordedTrip:
         raise _damaged(path, _first_line(error)) from error
 
 
+def read_head(path: Path) -> RecordedTrip:
+    """Read what a recording says of its trip, without the drive: `frames` is empty.
+
+    Raises:
+        DataError: As `read_trip`; damage further behind is not seen.
+    """
+    wanted = {channel.topic for channel in _HEAD}
+    heads: dict[str, Any] = {}
+    topics: dict[int, str] = {}
+    budget = _Budget()
+    try:
+        content = _content(path)
+        for record in _records(path, content, cut_file(content), budget):
+            if isinstance(record, Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, Message) and (topic := topics[record.channel_id]) in wanted:
+                budget.spend(record.data)
+                heads[topic] = json.loads(record.data)
+            if len(heads) == len(wanted):
+                break
+        if len(heads) < len(wanted):
+            raise _cut_early(path)
+        trip = _joined(lambda channel: heads[channel.topic])
+        return RecordedTrip(trip, (), _scenario.validate_python(heads[channels.SCENARIO.topic]))
+    except DataError:
+        raise
+    except _UNREADABLE as error:
+        raise _damaged(path, _first_line(error)) from error
+
+
 def compare_trips(first: RecordedTrip, second: RecordedTrip) -> Difference | None:
     """The first difference between two drives, or None if they are the same bit for bit.
 
     Compared are the frames, the final instant, outcome, metrics and what was said. Latencies, versions and other
     provenance may differ between equal drives. Of a recording that was cut off, the frames that it holds are compared.
     """
-    if first.cut_off or second.cut_off:
-        held = min(len(first.frames), len(second.frames))
-        pairs_held = zip(first.frames[:held], second.frames[:held], strict=True)
-        found = ((index, _difference(one, other)) for index, (one, other) in enumerate(pairs_held))
-        return next((Difference(index, *difference) for index, difference in found if difference), None)
     for index, (one, other) in enumerate(zip(first.frames, second.frames, strict=False)):
         if (found := _difference(one, other)) is not None:
-            return Difference(index, *found)
+            return Difference(index, *found, time_s=one.observation.time_s)
+    if first.cut_off or second.cut_off:
+        return None
     if len(first.frames) != len(second.frames):
         shared = min(len(first.frames), len(second.frames))
-        return Difference(shared, "number of frames", str(len(first.frames)), str(len(second.frames)))
+        longer = max(first.frames, second.frames, key=len)
+        counts = str(len(first.frames)), str(len(second.frames))
+        return Difference(shared, "number of frames", *counts, time_s=longer[shared].observation.time_s)
     pairs: tuple[tuple[str, Any, Any], ...] = (
         ("final", first.final, second.final),
         ("outcome", first.trip.outcome, second.trip.outcome),
@@ -350,16 +381,7 @@ def _read(path: Path, content: bytes, cut: CutFile | None) -> RecordedTrip:
             raise _damaged(path, f"{channel.topic} has {len(found)} messages, expected 1")
         return found[0][1]
 
-    trip = _trip.validate_python(
-        {
-            **single(channels.TRIP),
-            "instruction": single(channels.INSTRUCTION),
-            "context": single(channels.CONTEXT),
-            "history": single(channels.HISTORY),
-            "plan": single(channels.PLAN),
-            "verdicts": single(channels.VERDICTS)["verdicts"],
-        }
-    )
+    trip = _joined(single)
     if found == _WITH_SIDES:
         _turn_sides(messages)
     observations = _read_observations(messages)
@@ -383,6 +405,27 @@ def _read(path: Path, content: bytes, cut: CutFile | None) -> RecordedTrip:
         system=system[0] if system else None,
         final=observations[count] if has_final else None,
         cut_off=cut is not None,
+    )
+
+
+_HEAD = (
+    *(channels.TRIP, channels.INSTRUCTION, channels.CONTEXT, channels.HISTORY),
+    *(channels.PLAN, channels.VERDICTS, channels.SCENARIO),
+)
+"""Channels that hold one message, in front of the drive."""
+
+
+def _joined(payload: Callable[[channels.Channel], Any]) -> Trip:
+    """The trip of what its channels hold."""
+    return _trip.validate_python(
+        {
+            **payload(channels.TRIP),
+            "instruction": payload(channels.INSTRUCTION),
+            "context": payload(channels.CONTEXT),
+            "history": payload(channels.HISTORY),
+            "plan": payload(channels.PLAN),
+            "verdicts": payload(channels.VERDICTS)["verdicts"],
+        }
     )
 
 

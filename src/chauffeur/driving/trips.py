@@ -105,9 +105,9 @@ def file_trip(
         scenario=scenario.id,
         seed=seed,
         said=said,
-        record=(*_provenance(plan, scenario, seed, request.limits, engine), *facts),
+        record=(*provenance(plan, scenario, seed, request.limits, engine), *facts),
         unused=() if outcome in ("refused", "not_driven") else unused_of(request.instruction.text, plan),
-        parts_done=None if episode is None else episode.parts_done,
+        parts=() if episode is None else episode.parts,
         judged_by="" if episode is None else episode.judged_by,
     )
 
@@ -254,7 +254,7 @@ def _trip_id(instruction: Instruction, limits: Limits, plan: Plan, scenario: Sce
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 
-def _provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits, engine: str) -> Facts:
+def provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits, engine: str) -> Facts:
     """What a result must name to be repeated; a vehicle's drive cannot be."""
     repeats: Facts = (("scenario_sha256", scenario_hash(scenario)), ("seed", seed)) if engine else ()
     return (

@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping
 from importlib import resources
 
+_EXPORT = re.compile(r"^export ", re.MULTILINE)
 _SLOT = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -16,9 +17,11 @@ def fill(template: str, values: Mapping[str, str]) -> str:
     return _SLOT.sub(lambda match: values[match.group(1)], template)
 
 
-def asset(name: str) -> str:
-    """Text of a file of `hmi/assets`."""
-    return resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+def asset(name: str, package: str = "chauffeur.hmi") -> str:
+    """Text of a file in the folder `assets` of a package; of a module, without the `export` that a script of one piece
+    cannot have."""
+    text = resources.files(package).joinpath("assets", name).read_text(encoding="utf-8")
+    return _EXPORT.sub("", text) if name.endswith(".js") else text
 
 
 def content_hash(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -12,10 +13,14 @@ from chauffeur.hmi import words
 from chauffeur.hmi.interventions import ShieldedStretch, stretches_of
 from chauffeur.hmi.view import instants_of
 
-EventKind = Literal["said", "lane_change", "stopped", "finished", "failed", "collision", "off_road", "shield"]
+EventKind = Literal[
+    "said", "lane_change", "stopped", "drove_on", "finished", "failed", "collision", "off_road", "shield"
+]
 
 _STANDING_MPS = 0.3
 _MOVING_MPS = 1.0
+_AT_LIGHT_M = 15.0
+"""From the car's middle to an end of the stop line: the first car or the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +47,9 @@ def events_of(recorded: RecordedTrip) -> tuple[TripMark, ...]:
 
 
 def shield_label(stretch: ShieldedStretch) -> str:
-    """A stretch of the shield in words, with what became of the command."""
+    """A stretch of the shield in words."""
     lasted = stretch.end_s - stretch.start_s
-    change = words.change_words(stretch.before, stretch.after)
-    return f"Shield ({words.rule_words(stretch.rule)}, {lasted:.1f} s): {change}. {stretch.reason}"
+    return f"Shield, {lasted:.1f} s: {words.rule_words(stretch.rule)}. {stretch.reason}"
 
 
 def _program_events(frames: tuple[Frame, ...]) -> list[TripMark]:
@@ -55,7 +59,7 @@ def _program_events(frames: tuple[Frame, ...]) -> list[TripMark]:
             continue
         time = after.observation.time_s
         if after.program == "finished":
-            events.append(TripMark(time, "finished", "The policy is done; the car keeps its wishes."))
+            events.append(TripMark(time, "finished", "The plan is done; the car keeps its set-points."))
         elif after.program == "failed":
             events.append(TripMark(time, "failed", "The program failed; the autopilot drives on."))
     return events
@@ -74,11 +78,19 @@ def _drive_events(instants: tuple[Observation, ...]) -> list[TripMark]:
             )
         if not standing and after.ego.speed_mps < _STANDING_MPS:
             standing = True
-            events.append(TripMark(after.time_s, "stopped", "Came to a stop."))
+            events.append(TripMark(after.time_s, "stopped", f"Came to a stop{' at a red light' * _at_red(after)}."))
         elif standing and after.ego.speed_mps > _MOVING_MPS:
             standing = False
+            stood = any(event.kind == "stopped" for event in events)
+            events.append(TripMark(after.time_s, "drove_on", "Drove on." if stood else "Set off."))
         if after.ego.crashed and not before.ego.crashed:
             events.append(TripMark(after.time_s, "collision", "Collision."))
         if after.off_road and not before.off_road:
             events.append(TripMark(after.time_s, "off_road", "Left the road."))
     return events
+
+
+def _at_red(shot: Observation) -> bool:
+    """True where the car stands before a light of its lane that is red."""
+    lights = (light for light in shot.signals if light.state == "red" and shot.ego.lane in light.lanes)
+    return any(math.dist(light.stop_line_m[0], (shot.ego.x_m, shot.ego.y_m)) < _AT_LIGHT_M for light in lights)

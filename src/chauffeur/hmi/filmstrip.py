@@ -1,4 +1,4 @@
-"""A drive as a strip of pictures from above, for a README or a report."""
+"""A drive as a strip of pictures from above, or as a moving one, for a README or a report."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from chauffeur.concept import DataError, Observation, VehicleState
-from chauffeur.concept.paint import css_colour
+from chauffeur.concept import DataError, Observation
 from chauffeur.concept.units import people_speed
 from chauffeur.driving.files import publish
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import EventKind, TripMark, events_of
 from chauffeur.hmi.interventions import stretches_of
-from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
+from chauffeur.hmi.road import Bounds, draw_road, track_box
+from chauffeur.hmi.stills import Canvas, road_shapes, scene_shapes
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 _WIDTH = 1600
@@ -40,15 +40,16 @@ _WHOLE_M = 250.0
 """A way that reaches farther is not shown as a whole: the pictures follow the car."""
 _FOLLOWED_M = 110.0
 _SUPERSAMPLE = 2
+_FRAME_S = 0.1
+"""Least time between two pictures of a moving one."""
+_TOLD_S = 1.5
+"""How long a moving picture tells of an event."""
+_HELD_MS = 2500
+_QUALITY = 60
+"""WebP's: flat colours stay clean, a drive of 11 s takes some 0.6 MB."""
 
 _PAPER, _INK, _MUTED = "#f4f2ec", "#1c1f24", "#59606a"
-_GROUND, _VERGE, _EDGE, _ASPHALT = "#dfe3d3", "#cdd2bf", "#444a52", "#50565f"
-_MARK, _CENTRE, _HATCH = "#f4f2ea", "#f2c14b", "#737a84"
-_CAR, _CAR_EDGE = "#d9dee4", "#2d3239"
-_EGO, _EGO_EDGE, _TRAIL = "#ffb224", "#4a2c00", "#c9963a"
-_OBSTACLE, _STOP, _CRASH = "#c9452f", "#b3201a", "#d6281e"
-_CONE = "#e8641b"
-_GUARD, _RING = "#5a3ea6", "#cbb9ff"
+_GUARD = "#5a3ea6"
 
 _RANK: dict[EventKind, int] = {
     "collision": 0,
@@ -59,6 +60,7 @@ _RANK: dict[EventKind, int] = {
     "stopped": 5,
     "said": 6,
     "finished": 7,
+    "drove_on": 8,
 }
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -91,12 +93,53 @@ def write_filmstrip(path: Path, recorded: RecordedTrip, frames: int = 6) -> Path
 
 def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
     """The strip as an image. Raises DataError when nothing was driven."""
+    shots = _shots(recorded)
+    return _sheet(recorded, shots, choose_moments([shot.time_s for shot in shots], events_of(recorded), frames))
+
+
+def write_moving_picture(path: Path, recorded: RecordedTrip, width: int = 880) -> Path:
+    """Write the drive as an animated WebP that plays at the drive's own pace and stands still for a moment at its end.
+
+    Args:
+        path: The `.webp` file; its folder is made if need be.
+        recorded: The trip.
+        width: Width, px.
+
+    Raises:
+        DataError: Nothing was driven, or the file cannot be written.
+    """
+    shots, events = _shots(recorded), events_of(recorded)
+    shown = [0]
+    for index in range(1, len(shots)):
+        if shots[index].time_s - shots[shown[-1]].time_s > _FRAME_S - 1e-6 or index == len(shots) - 1:
+            shown.append(index)
+    pictures: list[Image.Image] = []
+    for index in shown:
+        past = [event for event in events if 0.0 <= shots[index].time_s - event.time_s <= _TOLD_S]
+        moment = Moment(index, min(past, key=lambda e: (_RANK[e.kind], -e.time_s), default=None))
+        sheet = _sheet(recorded, shots, (moment,))
+        pictures.append(sheet.resize((width, round(sheet.height * width / sheet.width)), Image.Resampling.LANCZOS))
+    times = [shots[index].time_s for index in shown]
+    still_ms = [round(1000.0 * (after - before)) for before, after in pairwise(times)] + [_HELD_MS]
+    buffer = io.BytesIO()
+    pictures[0].save(
+        buffer, "WEBP", save_all=True, append_images=pictures[1:], duration=still_ms, loop=0, quality=_QUALITY, method=6
+    )
+    return publish(path, buffer.getvalue(), "moving picture")
+
+
+def _shots(recorded: RecordedTrip) -> tuple[Observation, ...]:
     shots = facing_right(instants_of(recorded))
     if not shots:
-        raise DataError("Nothing was driven, so there is no filmstrip.", hint="The page shows why.")
+        raise DataError("Nothing was driven, so there is no picture.", hint="The page shows why.")
+    return shots
+
+
+def _sheet(recorded: RecordedTrip, shots: tuple[Observation, ...], moments: Sequence[Moment]) -> Image.Image:
+    """Title and pictures."""
     camera = frame_drive(shots)
-    moments = choose_moments([shot.time_s for shot in shots], events_of(recorded), frames)
-    road = draw_road(shots[0].road, shots[0].objects, track_box(_path(shots)).grown(200.0))
+    seen = track_box(_path(shots)).grown(200.0)
+    road = tuple(road_shapes(draw_road(shots[0].road, shots[0].objects, seen, shots[0].signs)))
 
     columns = 1 if camera.along else min(_COLUMNS, len(moments))
     width = (_WIDTH - 2 * _MARGIN - _GAP * (columns - 1)) / columns
@@ -126,8 +169,8 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
         _head(ImageDraw.Draw(sheet), shot, moment.event, now, x, y, width)
         middle_x = shot.ego.x_m + width / scale * (0.5 - _EGO_PLACE) if camera.along else _middle(camera.box)[0]
         middle = (shot.ego.x_m, shot.ego.y_m) if follows else (middle_x, _middle(camera.box)[1])
-        panel = _Panel(round(width * k), round(height * k), scale * k, *middle)
-        panel.paint(road, shots[: moment.index + 1])
+        panel = Canvas(round(width * k), round(height * k), scale * k, middle)
+        panel.paint((*road, *scene_shapes(shots[: moment.index + 1], seen)))
         if now:
             panel.ring(shot.ego)
         sheet.paste(panel.image, (round(x * k), round((y + _HEAD_HEIGHT) * k)))
@@ -229,124 +272,3 @@ def _head(
         words_fit = _fit(draw, text, font, right - pen)
         draw.text((pen, baseline), words_fit, ink, font, anchor="ls")
         pen += draw.textlength(words_fit, font=font) + 16 * k
-
-
-class _Panel:
-    """One picture: world metres onto pixels."""
-
-    def __init__(self, width: int, height: int, scale: float, middle_x: float, middle_y: float) -> None:
-        self.image = Image.new("RGB", (width, height), _GROUND)
-        self._draw = ImageDraw.Draw(self.image)
-        self._size = width, height
-        self._scale = scale
-        self._middle = middle_x, middle_y
-
-    def paint(self, road: PaintedRoad, so_far: Sequence[Observation]) -> None:
-        """Road, traffic and the ego at the last of the instants, with its way so far."""
-        shot = so_far[-1]
-        for extra, ink in ((3.0, _VERGE), (0.8, _EDGE), (0.06, _ASPHALT)):
-            for surface in road.surfaces:
-                self._line(surface.centre_m, surface.width_m + extra, ink)
-        for surface in road.surfaces:
-            if surface.emergency:
-                self._hatch(surface.centre_m, surface.width_m / 2.0)
-        for line in road.lines:
-            ink = _CENTRE if line.style == "centre" else _MARK
-            for piece in _dashes(line.points_m) if line.style == "dashed" else [line.points_m]:
-                self._line(piece, 0.17, ink)
-        for bar in road.bars_m:
-            self._line(bar, BAR_M, _MARK)
-        self._line(_path(so_far), 0.45, _TRAIL)
-        for sign in road.stop_signs:
-            self._line(sign.line_m, 0.5, _MARK)
-            self._octagon(sign.post_m)
-        for thing in shot.objects:
-            if thing.kind == "obstacle":
-                self._body(thing, _OBSTACLE, _CAR_EDGE)
-            elif thing.kind == "static":
-                self._cone(thing)
-        for car in shot.others:
-            paint = _CAR if car.colour is None else css_colour(car.colour)
-            self._body(car, _CRASH if car.crashed else paint, _CAR_EDGE)
-        self._body(shot.ego, _CRASH if shot.ego.crashed else _EGO, _EGO_EDGE, halo=True)
-
-    def ring(self, ego: VehicleState) -> None:
-        """A ring around the ego while the shield acts."""
-        u, v = 0.5 + 1.2 / ego.length_m, 0.5 + 0.8 / ego.width_m
-        corners = [self._on(ego, *place) for place in ((-u, -v), (u, -v), (u, v), (-u, v))]
-        self._draw.line([*corners, corners[0]], fill=_RING, width=max(4, round(0.35 * self._scale)), joint="curve")
-
-    def _at(self, x_m: float, y_m: float) -> tuple[float, float]:
-        return (
-            (x_m - self._middle[0]) * self._scale + self._size[0] / 2.0,
-            (y_m - self._middle[1]) * self._scale + self._size[1] / 2.0,
-        )
-
-    def _line(self, points: Sequence[tuple[float, float]], width_m: float, ink: str) -> None:
-        if len(points) < 2:
-            return
-        pixels = [self._at(x, y) for x, y in points]
-        self._draw.line(pixels, fill=ink, width=max(2, round(width_m * self._scale)), joint="curve")
-
-    def _hatch(self, centre: Sequence[tuple[float, float]], half_m: float) -> None:
-        for (x0, y0), (x1, y1) in pairwise(centre):
-            length = math.dist((x0, y0), (x1, y1))
-            ux, uy = (x1 - x0) / length, (y1 - y0) / length
-            inner = half_m * 0.86
-            for step in range(int(length // 4)):
-                x, y = x0 + ux * step * 4, y0 + uy * step * 4
-                start = (x + uy * inner, y - ux * inner)
-                end = (x + ux * 2 * inner - uy * inner, y + uy * 2 * inner + ux * inner)
-                self._line((start, end), 0.18, _HATCH)
-
-    def _octagon(self, post: tuple[float, float]) -> None:
-        x, y = self._at(*post)
-        radius = max(13.0, 1.5 * self._scale)
-        corners = [math.pi / 8 + i * math.pi / 4 for i in range(8)]
-        shape = [(x + radius * math.cos(a), y + radius * math.sin(a)) for a in corners]
-        self._draw.polygon(shape, fill=_STOP, outline="#ffffff", width=3)
-        self._draw.text((x, y), "STOP", "#ffffff", ImageFont.load_default(radius * 0.62), anchor="mm")
-
-    def _cone(self, thing: VehicleState) -> None:
-        x, y = self._at(thing.x_m, thing.y_m)
-        radius = max(5.0, 0.5 * max(thing.length_m, thing.width_m) * self._scale)
-        for share, ink in ((1.0, _CONE), (0.62, "#ffffff"), (0.38, _CONE)):
-            own = radius * share
-            self._draw.ellipse((x - own, y - own, x + own, y + own), fill=ink)
-
-    def _body(self, body: VehicleState, fill: str, edge: str, *, halo: bool = False) -> None:
-        if halo:
-            self._rectangle(body, -0.62, 0.62, 0.78, "#ffe2a6")
-        self._rectangle(body, -0.5, 0.5, 0.5, fill, edge)
-        self._rectangle(body, 0.08, 0.25, 0.37, edge)
-        self._rectangle(body, -0.36, -0.27, 0.34, edge)
-
-    def _on(self, body: VehicleState, u: float, v: float) -> tuple[float, float]:
-        """Pixel of a place on a body, in shares of its length and width from its centre."""
-        c, s = math.cos(body.heading_rad), math.sin(body.heading_rad)
-        return self._at(
-            body.x_m + c * u * body.length_m - s * v * body.width_m,
-            body.y_m + s * u * body.length_m + c * v * body.width_m,
-        )
-
-    def _rectangle(
-        self, body: VehicleState, back: float, front: float, half: float, fill: str, edge: str | None = None
-    ) -> None:
-        """A part of a body, in shares of its length and width."""
-        corners = [(back, -half), (front, -half), (front, half), (back, half)]
-        points = [self._on(body, u, v) for u, v in corners]
-        self._draw.polygon(points, fill=fill, outline=edge, width=3 if edge else 1)
-
-
-def _dashes(points: Sequence[tuple[float, float]]) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """3 m of paint, 6 m without, along a line."""
-    pieces: list[tuple[tuple[float, float], tuple[float, float]]] = []
-    for (x0, y0), (x1, y1) in pairwise(points):
-        length = math.dist((x0, y0), (x1, y1))
-        ux, uy = (x1 - x0) / length, (y1 - y0) / length
-        start = 0.0
-        while start < length:
-            end = min(start + 3.0, length)
-            pieces.append(((x0 + ux * start, y0 + uy * start), (x0 + ux * end, y0 + uy * end)))
-            start += 9.0
-    return pieces

@@ -16,7 +16,7 @@ import logging
 import secrets
 import socket
 import ssl
-from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -41,13 +41,15 @@ AT_THE_DOOR_S: Final = 5.0
 
 _HEADERS: Final = {
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
-    "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",  # the token stands in the address
     "X-Content-Type-Options": "nosniff",
 }
+_POLICY: Final = (
+    "default-src 'none'; script-src {own}; style-src {own}; connect-src 'self'; "
+    "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 _PERMISSIONS: Final = "camera=(), display-capture=(), geolocation=(), payment=(), usb=(), microphone="
 
 
@@ -57,6 +59,19 @@ class PageFile:
 
     package: str
     name: str
+    kind: str
+
+    @property
+    def text(self) -> str:
+        """Its content."""
+        return resources.files(self.package).joinpath("assets", self.name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True)
+class PageText:
+    """Content that was put together, and its media type."""
+
+    text: str
     kind: str
 
 
@@ -73,10 +88,11 @@ class LocalPage:
 
     def __init__(
         self,
-        files: Mapping[str, PageFile],
+        files: Mapping[str, PageFile | PageText],
         socket: str,
         *,
         microphone: bool = False,
+        inline: Sequence[str] = (),
         host: str = HOST,
         certificate: Certificate | None = None,
     ) -> None:
@@ -86,6 +102,7 @@ class LocalPage:
             files: What is served, by the path behind the token; the page itself at the empty one.
             socket: Path of the WebSocket behind the token.
             microphone: Whether the page may ask for it.
+            inline: Hashes of styles and scripts that stand in the page itself (`document.content_hash`).
             host: Name or number of this server; anything but this machine alone needs a certificate.
             certificate: For that.
 
@@ -108,7 +125,11 @@ class LocalPage:
         self._token = secrets.token_urlsafe(18)
         self._tls = _tls(certificate)
         self._door: _Door | None = None
-        self._headers = _HEADERS | {"Permissions-Policy": _PERMISSIONS + ("(self)" if microphone else "()")}
+        own = " ".join(("'self'", *inline))
+        self._headers = _HEADERS | {
+            "Content-Security-Policy": _POLICY.format(own=own),
+            "Permissions-Policy": _PERMISSIONS + ("(self)" if microphone else "()"),
+        }
 
     @property
     def url(self) -> str:
@@ -141,8 +162,7 @@ class LocalPage:
         file = self._files.get(rest)
         if file is None:
             return self._answer(connection, HTTPStatus.NOT_FOUND, "There is nothing here.")
-        text = resources.files(file.package).joinpath("assets", file.name).read_text(encoding="utf-8")
-        return self._answer(connection, HTTPStatus.OK, text, file.kind)
+        return self._answer(connection, HTTPStatus.OK, file.text, file.kind)
 
     def _answer(
         self, connection: ServerConnection, status: HTTPStatus, text: str, kind: str = "text/plain"

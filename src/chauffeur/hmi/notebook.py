@@ -1,16 +1,14 @@
-"""What a notebook shows of a drive and of a benchmark run: the player, tables, plots."""
+"""What a notebook shows of a drive: the player, tables, plots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import fields
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import Frame, MissingExtraError, result_of
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import printable
@@ -85,7 +83,7 @@ class Drive(RecordedTrip):
 
     def frame(self) -> Any:
         """`columns()` as a `pandas.DataFrame`. Raises MissingExtraError: pandas is not installed."""
-        return _library("pandas", "A data frame").DataFrame(self.columns())
+        return library("pandas", "A data frame").DataFrame(self.columns())
 
     def plot(self) -> tuple[Any, Any]:
         """Plot speed with its set-point, and the gap, over time; returns both `matplotlib` axes.
@@ -93,7 +91,7 @@ class Drive(RecordedTrip):
         Raises:
             MissingExtraError: matplotlib is not installed.
         """
-        pyplot = _library("matplotlib.pyplot", "A plot")
+        pyplot = library("matplotlib.pyplot", "A plot")
         columns = self.columns()
         figure, (speed, gap) = pyplot.subplots(2, sharex=True, layout="constrained")
         figure.suptitle(printable(self.trip.summary), fontsize="small", parse_math=False)
@@ -109,36 +107,8 @@ class Drive(RecordedTrip):
         return speed, gap
 
 
-class Rows(list[Row]):
-    """Rows of a benchmark run: a list, with a table for people and one for pandas.
-
-    Attributes:
-        folder: The run's folder.
-    """
-
-    def __init__(self, rows: Iterable[Row], folder: Path) -> None:
-        """Args: the rows; the folder they are stored in."""
-        super().__init__(rows)
-        self.folder = folder
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<{len(self)} rows of the run in {str(self.folder)!r}>"
-
-    def _repr_markdown_(self) -> str:
-        """The run's table of results, as `table.md` has it."""
-        return (self.folder / "table.md").read_text(encoding="utf-8")
-
-    def frame(self) -> Any:
-        """One row an item as a `pandas.DataFrame`; `plan.usage.requests` is the column of a nested value.
-
-        Raises:
-            MissingExtraError: pandas is not installed.
-        """
-        return _library("pandas", "A data frame").json_normalize(list(self))
-
-
-def _library(name: str, need: str) -> Any:
+def library(name: str, need: str) -> Any:
+    """A module of the extra `notebook`. Raises MissingExtraError: it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

@@ -17,8 +17,12 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.payload import page_payload
 
-_STYLES = ("trip.css", "panels.css")
-_SCRIPTS = ("panels.js", "stage.js", "charts.js", "player.js")
+_STYLES = ("scene.css", "trip.css", "panels.css")
+_SCRIPTS = ("panels.js", "drawer.js", "stage.js", "charts.js", "player.js")
+
+
+_OUTCOME = {"outcome": "label", "sign": "sign", "tone": "tone", "account": "account"}
+"""Slots of the headline, and what fills them."""
 
 
 def write_page(path: Path, recorded: RecordedTrip) -> Path:
@@ -34,11 +38,10 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
     return publish(path, render_page(recorded).encode(), "page")
 
 
-def render_page(recorded: RecordedTrip) -> str:
-    """The page of a trip as text."""
+def render_page(recorded: RecordedTrip, *, embedded: bool = False) -> str:
+    """The page of a trip as text; an `embedded` one leaves out the name, which the page around it says."""
     payload = page_payload(recorded)
-    style = "\n".join(asset(name) for name in _STYLES)
-    script = "(() => {\n'use strict';\n" + "\n".join(asset(name) for name in _SCRIPTS) + "\n})();"
+    style, script = page_assets()
     policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
     return fill(
         asset("trip.html"),
@@ -46,13 +49,20 @@ def render_page(recorded: RecordedTrip) -> str:
             "policy": html.escape(policy),
             "title": html.escape(f"“{printable(payload['wish'])}” – {payload['outcome']['label']}"),
             "wish": html.escape(printable(payload["wish"])),
-            "outcome": html.escape(payload["outcome"]["label"]),
+            **{name: html.escape(printable(payload["outcome"][of])) for name, of in _OUTCOME.items()},
             "simulated": html.escape(payload["simulated"]),
+            "look": "embedded" if embedded else "",
             "style": style,
             "script": script,
             "data": embed_json(payload),
         },
     )
+
+
+def page_assets() -> tuple[str, str]:
+    """Style and script of every trip's page."""
+    script = "\n".join(asset(name) for name in _SCRIPTS)
+    return "\n".join(asset(name) for name in _STYLES), f"(() => {{\n'use strict';\n{script}\n}})();"
 
 
 def embed_json(value: Any) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import Any, cast
 
 from chauffeur.concept import (
@@ -25,7 +25,6 @@ from chauffeur.concept import (
     Trip,
     VehicleState,
     Verdict,
-    result_of,
 )
 from chauffeur.concept.paint import css_colour
 from chauffeur.concept.results import result_of_stored
@@ -34,17 +33,18 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
-from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
-from chauffeur.hmi.view import facing_right, frame_drive, instants_of, place_facing_right
+from chauffeur.hmi.road import Bounds, PaintedRoad, as_json, draw_road, track_box
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+from chauffeur.hmi.wanted import goal_of, wanted
 from chauffeur.safety.faithfulness import KINDS, score_words
-from chauffeur.worlds.town.pack import places_called
-from chauffeur.worlds.town.scenarios import places_of
 
 _WAYPOINTS_TOLD = 6
 _STRAIGHT_M = 0.05
 _SIGHT_M = 260.0
 """Nothing farther from the ego's path than this is ever on the screen."""
 
+_FELT = ("_mps", "_m", "_s")
+"""Ends of the names of settings that a person feels; gains and indices have none."""
 Json = dict[str, Any]
 
 
@@ -52,32 +52,26 @@ def page_payload(recorded: RecordedTrip) -> Json:
     """Everything the page shows."""
     trip = recorded.trip
     unit = words.pace_of(trip.instruction.text)
-    _, label, tone = words.trip_words(trip)
+    sign, label, tone = words.trip_words(trip)
 
     def said(text: str) -> str:
         return words.passenger_units(text, unit)
 
     return {
         "pace": {"unit": unit, "of": 1.0 / (MPS_PER_MPH if unit == "mph" else MPS_PER_KMH)},
-        "going_to": trip.plan.policy.route if isinstance(trip.plan.policy, Parameters) else "",
+        "going_to": goal_of(trip),
         "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
         "person": trip.instruction.person,
-        "source": trip.instruction.source,
         "title": recorded.scenario.title or recorded.scenario.id,
         "context": trip.context.text,
         "intent": trip.plan.intent,
-        "refusal": said(trip.plan.refusal),
-        "settings": [words.setting(name, value, unit) for name, value in trip.plan.settings],
-        "thoughts": said(trip.plan.thoughts.text),
+        "settings": [words.setting(name, value) for name, value in trip.plan.settings],
+        "thoughts": said("" if trip.plan.thoughts.text == trip.plan.refusal else trip.plan.thoughts.text),
         "view": "" if recorded.view is None else _data_uri(recorded.view.png()),
         "program": _program_lines(trip.plan.policy),
-        "policy": policy_words(trip.plan.policy, unit),
-        "verdicts": [
-            {"check": v.check, "passed": v.passed, "reason": said(_reason(v)), "line": v.line, "remedy": said(v.remedy)}
-            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark], "not_compared": v.not_compared}
-            for v in trip.verdicts
-        ],
+        "policy": policy_words(trip.plan.policy),
+        "verdicts": [_verdict(one, said) for one in trip.verdicts],
         "mismatches": [
             {"kind": KINDS[one.kind], "said": said(one.sentence), "instead": said(one.instead), "line": one.line}
             for one in _mismatches(trip)
@@ -86,20 +80,31 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "outcome": {
             "label": label,
             "tone": tone,
-            "causes": [said(text) for text in (*words.left_out_words(trip), *words.cause_words(trip.causes))],
-            "result": str(result_of(trip)),
+            "sign": sign,
+            "account": words.account_words(trip),
+            "causes": [said(text) for text in words.cause_words(trip.causes) if trip.outcome != "refused"],
             "judged": words.judged_words(trip),
             "end": words.end_words(trip),
         },
         "duration": round(trip.duration_s, 2),
         "metrics": [
-            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m, unit), "applies": m.applies}
+            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m), "applies": m.applies}
             for m in trip.metrics
         ],
         "history": [_history_item(item, unit) for item in trip.history.items],
         "provenance": [list(pair) for pair in provenance(trip)],
-        "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": e.label} for e in events_of(recorded)],
+        "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": said(e.label)} for e in events_of(recorded)],
         "drive": _drive(recorded),
+    }
+
+
+def _verdict(verdict: Verdict, said: Callable[[str], str]) -> Json:
+    return {
+        "name": words.check_name(verdict.check),
+        "reason": said(_reason(verdict)),
+        "remedy": said(verdict.remedy),
+        "sign": words.MARKS[verdict.mark],
+        **{name: getattr(verdict, name) for name in ("check", "passed", "line", "vetoes", "mark")},
     }
 
 
@@ -257,10 +262,8 @@ def _history_item(item: HistoryItem, unit: SpeedUnit) -> Json:
     return {
         "when": item.when,
         "instruction": item.instruction,
-        "intent": item.intent,
         "outcome": str(result_of_stored(item.outcome, item.intent)),
-        "similarity": round(item.similarity, 2),
-        "settings": [words.setting(name, value, unit) for name, value in item.settings],
+        "settings": [words.setting(name, value, unit) for name, value in item.settings if name.endswith(_FELT)],
         "feedback": [{"text": f.text, "meaning": words.feedback_words(f)} for f in item.feedback],
     }
 
@@ -278,17 +281,17 @@ def _drive(recorded: RecordedTrip) -> Json | None:
     limits = {lane.id: lane.speed_limit_mps for lane in lanes}
     camera = frame_drive(shots)
     sight = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots)).grown(_SIGHT_M)
-    road = draw_road(shots[0].road, shots[0].objects, sight)
+    road = draw_road(shots[0].road, shots[0].objects, sight, shots[0].signs)
     return {
         "time": [round(s.time_s, 2) for s in shots],
         "camera": {"along": camera.along, "box": [round(edge, 2) for edge in camera.box.edges]},
-        "road": _road(road),
+        "road": as_json(road),
         "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
         "cones": [_body(o) for o in shots[0].objects if o.kind == "static"],
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
         "cars": _cars(shots, sight),
         "lights": _lights(shots, sight),
-        "places": _places(recorded, seen[0], sight),
+        **wanted(recorded, sight),
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
@@ -297,6 +300,7 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
         "lead": [s.front.vehicle if s.front else None for s in shots],
         "stop": [_rounded(s.stop_sign_m) for s in shots],
+        "arrives": recorded.trip.outcome == "success",
         "lane": [_lane_words(s) for s in shots],
         "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
         "turn": [row.setpoints.turn if row else None for row in rows],
@@ -313,6 +317,7 @@ def _rounded(value: float | None) -> float | None:
 
 def _body(vehicle: VehicleState) -> Json:
     return {
+        "id": vehicle.id,
         "x": round(vehicle.x_m, 2),
         "y": round(vehicle.y_m, 2),
         "h": round(vehicle.heading_rad, 3),
@@ -371,31 +376,6 @@ def _lights(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
             if not one["s"] or one["s"][-1][1] != light.state:
                 one["s"].append([index, light.state])
     return list(found.values())
-
-
-def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[Json]:
-    """The places of a town that come into sight, and whether the drive leads there."""
-    policy = recorded.trip.plan.policy
-    there = places_of(recorded.scenario)
-    meant = places_called(there, policy.route) if isinstance(policy, Parameters) and policy.route else ()
-    found: list[Json] = []
-    for place in there:
-        x, y = place_facing_right(first, place.x_m, place.y_m)
-        if sight.x0 <= x <= sight.x1 and sight.y0 <= y <= sight.y1:
-            found.append({"n": place.name, "x": round(x, 1), "y": round(y, 1), "to": place in meant})
-    return found
-
-
-def _road(road: PaintedRoad) -> Json:
-    def flat(points: Iterable[tuple[float, float]]) -> list[float]:
-        return [round(value, 2) for point in points for value in point]
-
-    return {
-        "surfaces": [{"p": flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in road.surfaces],
-        "lines": [{"p": flat(line.points_m), "s": line.style} for line in road.lines],
-        "signs": [{"post": flat([s.post_m]), "line": flat(s.line_m)} for s in road.stop_signs],
-        "bars": {"w": BAR_M, "p": [flat(bar) for bar in road.bars_m]},
-    }
 
 
 def _goal(row: Frame | None, shot: Observation, road: PaintedRoad) -> int | None:

@@ -6,9 +6,10 @@ Whatever the road, the car sets off to the right of the picture, so that its lef
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from chauffeur.concept import Lane, Observation, RoadGraph, Signal, VehicleState
+from chauffeur.concept import Lane, Observation, RoadGraph, Sign, Signal, VehicleState
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, track_box
@@ -53,6 +54,12 @@ def place_facing_right(first: Observation, x_m: float, y_m: float) -> tuple[floa
     return _to_the_right(first).point(x_m, y_m)
 
 
+def as_picture(road: RoadGraph, signs: Iterable[Sign]) -> tuple[RoadGraph, tuple[Sign, ...]]:
+    """A road and its signs in the frame of pictures, not turned: north is up."""
+    turn = _Turn.by(0.0)
+    return RoadGraph(tuple(turn.lane(lane) for lane in road.lanes)), tuple(turn.sign(one) for one in signs)
+
+
 def _to_the_right(first: Observation) -> _Turn:
     heading = first.ego.heading_rad
     return _Turn.by(0.0 if abs(math.sin(heading / 2.0)) < _LEVEL else heading)
@@ -60,6 +67,7 @@ def _to_the_right(first: Observation) -> _Turn:
 
 def _turned(instants: tuple[Observation, ...], turn: _Turn) -> tuple[Observation, ...]:
     roads: dict[int, RoadGraph] = {}
+    signs = tuple(turn.sign(one) for one in instants[0].signs)  # they do not change within a trip
     turned: list[Observation] = []
     for shot in instants:
         if id(shot.road) not in roads:
@@ -72,6 +80,7 @@ def _turned(instants: tuple[Observation, ...], turn: _Turn) -> tuple[Observation
                 objects=tuple(turn.vehicle(thing) for thing in shot.objects),
                 road=roads[id(shot.road)],
                 signals=tuple(turn.signal(one) for one in shot.signals),
+                signs=signs,
             )
         )
     return tuple(turned)
@@ -119,6 +128,11 @@ class _Turn:
     def signal(self, one: Signal) -> Signal:
         (ax, ay), (bx, by) = one.stop_line_m
         return replace(one, stop_line_m=(self.point(ax, ay), self.point(bx, by)))
+
+    def sign(self, one: Sign) -> Sign:
+        x, y = self.point(one.x_m, one.y_m)
+        line = None if one.stop_line_m is None else (self.point(*one.stop_line_m[0]), self.point(*one.stop_line_m[1]))
+        return replace(one, x_m=x, y_m=y, stop_line_m=line)
 
     def lane(self, lane: Lane) -> Lane:
         return replace(lane, centre=Polyline.of(self.point(x, y) for x, y in lane.centre.points_m))

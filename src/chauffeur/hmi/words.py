@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 from chauffeur.concept import (
-    ANSWERED,
-    RESULT_LABELS,
     Causes,
     Command,
     Feedback,
@@ -19,13 +18,16 @@ from chauffeur.concept import (
     Mark,
     Metric,
     Outcome,
+    PartResult,
     Result,
     Trip,
     Verdict,
+    WishPart,
     result_of,
 )
-from chauffeur.concept.results import ANSWERED_LABEL
-from chauffeur.concept.units import SpeedUnit, people_speed
+from chauffeur.concept.units import MPS_PER_KMH, SpeedUnit, people_speed
+from chauffeur.driving.judge.account import understood_of
+from chauffeur.driving.judge.trace import STANDS_MPS
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -48,13 +50,28 @@ def simulated(world: str) -> str:
     return _OTHER_PHYSICS.get(world, SIMULATED)
 
 
-_WHY: Final[dict[Outcome, str]] = {
-    "collision": "It ended in a collision.",
-    "off_road": "The car left the road.",
-    "timeout": "Time or road ran out.",
-    "ended": "The drive was not compared with the wish: nothing in it is known to be over.",
+_SIGNS: Final[dict[Result, str]] = {
+    Result.DONE: "✓",
+    Result.PARTLY_DONE: "~",
+    Result.NOT_DONE: "✕",
+    Result.ASKED_BACK: "?",
+    Result.DECLINED: "–",
+    Result.FAILED: "✕",
 }
-"""Outcomes that a result's word does not tell, in a sentence."""
+_ENDED: Final[dict[Outcome, str]] = {
+    "collision": "it ended in a collision",
+    "off_road": "the car left the road",
+    "timeout": "time or road ran out",
+}
+"""Ends of a drive that its parts do not tell."""
+_NOT_DONE: Final[frozenset[Outcome]] = frozenset({"failure", "timeout", "not_driven"})
+_SAID_BACK: Final[dict[Result, str]] = {
+    Result.DONE: "I answered",
+    Result.ASKED_BACK: "I asked back",
+    Result.DECLINED: "I declined",
+    Result.FAILED: "no plan could be used",
+}
+"""What became of a wish of which nothing was driven, before the reason."""
 RESULT_TONES: Final[dict[Result, Tone]] = {
     Result.DONE: "good",
     Result.PARTLY_DONE: "neutral",
@@ -107,18 +124,21 @@ MARK_STYLES: Final[dict[Mark, str]] = {
 }
 
 _MPH: Final = re.compile(r"\b(?:mph|miles? (?:per|an) hour)\b", re.IGNORECASE)
+_KMH: Final = re.compile(r"\b(?:km\s?/?\s?h|kph|kilomet(?:er|re)s? (?:per|an) hour)\b", re.IGNORECASE)
+_IN_KMH: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) km/h(?: \(\d{1,4} mph\))?")
 _SPEED: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) m/s(?![²2^\w/])(?: \([^()\n]{1,40}\))?")
 _LENGTH: Final = re.compile(r"(?<![\w.])(\d{1,5}\.\d{1,9}) m(?![\w/])")
 
 
-def pace_of(wish: str) -> SpeedUnit:
-    """The unit of speed for a person, by the words of their wish."""
-    return "mph" if _MPH.search(wish) else "km/h"
+def pace_of(wish: str, before: SpeedUnit = "km/h") -> SpeedUnit:
+    """The unit of speed for a person, by the words of their wish; the one before where they name none."""
+    return "mph" if _MPH.search(wish) else "km/h" if _KMH.search(wish) else before
 
 
 def passenger_units(text: str, unit: SpeedUnit = "km/h") -> str:
-    """A text with its m/s in the person's unit and its metres whole; what stood in brackets behind was that, too."""
+    """A text with its speeds in the person's unit and its metres whole; what stood in brackets behind was that, too."""
     told = _SPEED.sub(lambda match: people_speed(float(match[1]), unit), text)
+    told = _IN_KMH.sub(lambda match: people_speed(float(match[1]) * MPS_PER_KMH, unit), told)
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 
@@ -130,30 +150,51 @@ def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
         timed: Whether the label says after how long, where anything was driven.
     """
     result = result_of(trip)
-    tone, label = RESULT_TONES[result], RESULT_LABELS[result]
-    if trip.plan.refusal and trip.plan.intent == ANSWERED:
-        return "■", ANSWERED_LABEL, "neutral"
-    if result is Result.DONE and trip.outcome == "ended":
-        label, tone = "Done, not compared", "neutral"
-    if result is Result.FAILED and trip.outcome in ("collision", "off_road"):
-        label = f"{label}: {_WHY[trip.outcome][0].lower()}{_WHY[trip.outcome][1:-1]}"
+    tone, label = RESULT_TONES[result], str(result).capitalize()
+    compared = result is not Result.DONE or trip.outcome not in ("ended", "refused")
+    if not compared:
+        label, tone = label if trip.outcome == "refused" else f"{label}, not compared", "neutral"
     if timed and trip.duration_s:
         label = f"{label} after {trip.duration_s:.0f} s"
     if tone != "bad" and unexplained(trip.verdicts):
         return MARKS["differs"], f"{label}, not as explained", "neutral"
-    signs: dict[Tone, str] = {"good": MARKS["passed"], "bad": MARKS["failed"], "neutral": "■"}
-    return signs[tone], label, tone
+    sign = _SIGNS[result] if compared else MARKS["not_compared"]
+    return sign, label, tone
 
 
-def left_out_words(trip: Trip) -> tuple[str, ...]:
-    """Sentences on what of the wish was not used, or not compared; empty where all of it was."""
-    told: list[str] = []
+def account_words(trip: Trip) -> str:
+    """What was understood, done and not done, as the rest of a sentence that begins with the wish, in its units."""
+    told = passenger_units("; ".join(part for part in _account(trip) if part), pace_of(trip.instruction.text))
+    return f"; {told}{'' if told.endswith(('.', '?', '!')) else '.'}"
+
+
+def _account(trip: Trip) -> Iterator[str]:
+    if trip.outcome == "refused":
+        yield f"{_SAID_BACK.get(result_of(trip), 'nothing was driven')}: {trip.plan.refusal or trip.causes.detail}"
+        return
+    named = understood_of(trip.plan)
+    parts = [replace(one, words=one.words or ", then ".join(named)) for one in trip.parts]
+    understood = [part.words for part in parts] or [*named]
+    yield f"I understood: {', then '.join(understood)}" if any(understood) else ""
+    done = [part.words for part in parts if part.result == "done"]
+    if len(done) == len(parts) and (parts or trip.outcome == "success"):
+        yield "done: all of it" if len(parts) > 1 else "done"
+    else:
+        yield f"done: {', '.join(done)}" if done else ""
+        yield "not done" if not parts and trip.outcome in _NOT_DONE else ""
+        yield f"not done: {why}" if (why := _short(parts, "not_done", "opposite")) else ""
+    yield _ENDED.get(trip.outcome, "")
+    yield f"not compared: {why}" if (why := _short(parts, "not_judged")) else ""
+    if trip.outcome == "ended" and not parts:
+        yield "not compared: nothing in this drive can be held against the words"
     if trip.unused:
-        named = ", ".join(f"“{part}”" for part in trip.unused)
-        told.append(f"I did not use: {named}." if trip.plan.intent else f"Not known to be used: {named}.")
-    if trip.outcome in ("timeout", "ended"):
-        told.append(_WHY[trip.outcome])
-    return tuple(told)
+        yield f"not used: {', '.join(f'“{words}”' for words in trip.unused)}"
+
+
+def _short(parts: Sequence[WishPart], *results: PartResult) -> str:
+    """Parts that ended so, each with why; empty where there is none."""
+    found = (part for part in parts if part.result in results)
+    return ", ".join(f"{part.words} ({part.why})" if part.why else part.words for part in found)
 
 
 def judged_words(trip: Trip) -> str:
@@ -174,6 +215,11 @@ _CHECKS: Final = {
 def not_compared_words(verdict: Verdict) -> str:
     """Why a check compared nothing: `not compared: there is no program to follow.`"""
     return f"not compared: {verdict.reason[:1].lower()}{verdict.reason[1:]}"
+
+
+def not_compared_names(verdicts: Sequence[Verdict]) -> str:
+    """The checks that compared nothing, by name; empty where all did."""
+    return ", ".join(check_name(verdict.check) for verdict in verdicts if verdict.mark == "not_compared")
 
 
 def check_name(check: str) -> str:
@@ -201,8 +247,10 @@ def end_words(trip: Trip) -> str:
         parts.append(_beside("gap", found["end-gap-v1"], found.get("asked-gap-v1"), lambda gap: f"{gap:.0f} m"))
     if "end-speed-v1" in found:
         wanted = found.get("asked-speed-v1")
-        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: people_speed(speed, unit)))
-    text = ", ".join(parts)
+        stands = found["end-speed-v1"] < STANDS_MPS and not wanted
+        speed = _beside("speed", found["end-speed-v1"], wanted, lambda speed: people_speed(speed, unit))
+        parts.append("standing" if stands else speed)
+    text = "" if parts == ["standing"] else ", ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

@@ -26,6 +26,7 @@ from chauffeur.planners.llm_errors import EndpointError, timed_out
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
 from chauffeur.planners.llm_settings import LlmSettings, parse_address
 from chauffeur.planners.prompts import Message
+from chauffeur.planners.transcript import keep_exchange
 
 if TYPE_CHECKING:
     import numpy as np
@@ -245,6 +246,7 @@ class ChatModel:
             bill.prompt_tokens += kept.prompt_tokens
             bill.completion_tokens += kept.completion_tokens
             self._show(kept.text, bill.requests)
+            keep_exchange(messages, kept.text)
             return kept
 
         async def attempt() -> Completion:
@@ -267,6 +269,7 @@ class ChatModel:
         bill.priced_completion += completion.completion_tokens
         if self._cache and completion.text and completion.finish == "stop":
             self._cache.put(key, completion)
+        keep_exchange(messages, completion.text)
         return completion
 
     def usage(self, bill: ChatBill) -> Usage:

@@ -8,6 +8,9 @@ A planner is registered as an entry point in the group `chauffeur.planners`; the
 The object has a classmethod (or function) `from_spec(argument: str, **options) -> Planner`. `argument` is what stands
 after the first slash of the specification, "" without one; `options` are keyword arguments that it names itself, so
 that a mistyped one is refused. Nothing of a planner is imported before it is asked for.
+
+Without a package, `my_module:MyPlanner` is as good a name, with `/argument` where it takes one: the module is looked
+for as `python -m` does.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import inspect
 from collections.abc import Callable
 
 from chauffeur.concept import ConfigError
-from chauffeur.concept.registry import load_plugin, made, plugin_names
+from chauffeur.concept.registry import load_plugin, made, plugin_at, plugin_names
 from chauffeur.planners.base import Answerer, Planner
 
 GROUP = "chauffeur.planners"
@@ -35,35 +38,13 @@ def make_planner(spec: str, **options: object) -> Planner:
     'openai/gpt-4o'
 
     Args:
-        spec: `name` or `name/argument`.
+        spec: `name` or `name/argument`; or `module:NAME` of a planner, or of a class or function that makes one.
         **options: Settings of that planner, e.g. `base_url` for `openai`.
 
     Raises:
         ConfigError: Unknown name or setting, a setting the planner refuses, or a planner that cannot be imported.
     """
     return _checked(spec, _make(spec, options))
-
-
-def planner_from(found: object, name: str, argument: str = "", **options: object) -> Planner:
-    """The planner that an object of a module is or makes.
-
-    Args:
-        found: A planner, a class or function that makes one without arguments, or anything that has `from_spec`.
-        name: What it is called, for messages.
-        argument: For `from_spec`.
-        **options: For `from_spec`.
-
-    Raises:
-        ConfigError: It is none and makes none, or takes no such argument or option.
-    """
-    build = getattr(found, "from_spec", None)
-    if callable(build):
-        return _checked(name, _built(name, build, argument, options))
-    if argument:
-        raise ConfigError(f"Planner {name!r} takes no argument ({argument!r}).", hint="Give it a from_spec(argument).")
-    if isinstance(found, Planner) and not isinstance(found, type):
-        return found
-    return _checked(name, made("planner", name, found, **options))
 
 
 def _checked(name: str, planner: object) -> Planner:
@@ -89,7 +70,16 @@ def make_answerer(spec: str, **options: object) -> Answerer:
 
 def _make(spec: str, options: dict[str, object]) -> object:
     name, _, argument = spec.strip().partition("/")
-    return _built(name, _builder(name), argument, options)
+    if ":" not in name:
+        return _built(name, _builder(name), argument, options)
+    found = plugin_at(name)
+    build = getattr(found, "from_spec", None)
+    if callable(build):
+        return _built(name, build, argument, options)
+    if argument:
+        raise ConfigError(f"Planner {name!r} takes no argument ({argument!r}).", hint="Give it a from_spec(argument).")
+    ready = isinstance(found, Planner | Answerer) and not isinstance(found, type)
+    return found if ready else made("planner", name, found, **options)
 
 
 def _built(name: str, build: Callable[..., object], argument: str, options: dict[str, object]) -> object:
@@ -99,7 +89,9 @@ def _built(name: str, build: Callable[..., object], argument: str, options: dict
 
 def takes_option(spec: str, option: str) -> bool:
     """True if the planner a specification names has a setting of that name. Raises ConfigError as `make_planner`."""
-    return option in _options_of(inspect.signature(_builder(spec.strip().partition("/")[0])))
+    name = spec.strip().partition("/")[0]
+    build = getattr(plugin_at(name), "from_spec", None) if ":" in name else _builder(name)
+    return build is not None and option in _options_of(inspect.signature(build))
 
 
 def _options_of(signature: inspect.Signature) -> list[str]:

@@ -54,7 +54,7 @@ class TransformersAnswerer:
         try:
             from transformers import AutoModelForImageTextToText
         except ImportError as error:
-            raise MissingExtraError("A model in this process needs transformers.", extra="models") from error
+            raise MissingExtraError("A model in this process needs transformers.", extra="transformers") from error
         try:
             processor: Any = load_processor(argument)
             model: Any = AutoModelForImageTextToText.from_pretrained(argument).eval()

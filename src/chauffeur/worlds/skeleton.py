@@ -7,7 +7,7 @@ from typing import Final, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError
+from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError, WishPart
 
 Config = TypeVar("Config", bound=BaseModel)
 PerceptionT = TypeVar("PerceptionT")
@@ -90,9 +90,10 @@ class PlaceJudge:
         raise NotImplementedError
 
     @property
-    def parts_done(self) -> tuple[int, int]:
-        """One where the car is there, of one."""
-        return int(self.success), 1
+    def parts(self) -> tuple[WishPart, ...]:
+        """The one thing asked for: to be there."""
+        why = "" if self.success else "the car stands elsewhere" if self.over else "the car did not get there"
+        return (WishPart("done" if self.success else "not_done", why=why),)
 
     def outcome(self) -> Outcome:
         """Outcome of the trip, collisions apart."""

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from cabin_desk import SAID, SAID_MPS, Desk
 from cabin_drive import Drive, driving
-from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
 from chauffeur.driving.talk.messages import (
     Button,
@@ -30,6 +29,7 @@ from chauffeur.driving.talk.messages import (
     TakeOver,
 )
 from chauffeur.hmi.cabin import Cabin
+from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.server]
 
@@ -110,6 +110,53 @@ def test_what_cannot_be_used_is_not_shown(desk: Desk, size: tuple[int, int]) -> 
             await tab.until(f"document.getElementById('heard-words').textContent.includes({json.dumps(why)})")
             assert await tab.value("document.getElementById('talk').hidden")
             assert await tab.value("[...document.querySelectorAll('.spoken')].every((row) => row.hidden)")
+
+    desk.run(check())
+
+
+SEEN = """(selector) => {
+    const box = document.querySelector(selector).getBoundingClientRect();
+    return box.width > 0 && box.top >= 0 && box.left >= 0 && box.bottom <= innerHeight && box.right <= innerWidth;
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_phone_shows_the_road_the_speed_the_state_and_the_newest_turn_without_scrolling(
+    desk: Desk, drive: Drive, scheme: str
+) -> None:
+    words = f"Drive at {45 if scheme == 'light' else 50} mph."
+
+    async def check() -> None:
+        tab = desk.tab
+        await opened(tab, drive, PHONE)
+        await tab.prefer(scheme=scheme)
+        await sent(tab, words)
+        await tab.until(f"document.querySelector('.wish .said-words')?.textContent === {json.dumps(words)}")
+        await tab.until("document.querySelector('.wish:first-child .state.drive')")
+        await tab.until("document.querySelector('.speed .unit').textContent === 'mph'")
+        await asyncio.to_thread(drive.until, "the set-point", lambda: drive.scene.wish == drive.wish(words).wish)
+        for part in (
+            "#road",
+            "#speed",
+            "#level",
+            "#limit",
+            ".wish:first-child .state",
+            ".wish:first-child .said-words",
+        ):
+            assert await tab.value(f"({SEEN})({json.dumps(part)})"), part
+        for part in ("#wish", "#take-over", "#stop"):
+            assert await tab.value(f"({SEEN})({json.dumps(part)})"), part
+        whole, high, speed_px = await tab.value(
+            "[[document.documentElement.scrollWidth <= innerWidth,"
+            " document.documentElement.scrollHeight <= innerHeight], document.getElementById('road').clientHeight,"
+            " parseFloat(getComputedStyle(document.getElementById('speed')).fontSize)]"
+        )
+        assert whole == [True, True] and high >= 180 and speed_px >= 40
+        assert (await text(tab, "speed")).isdecimal() and (await text(tab, "limit")).isdecimal()
+        assert not await tab.value("document.querySelector('.wish .detail')?.open"), "the engineer's part is folded"
+        assert await tab.value(AUDIT) == []
+        await sent(tab, "Drive at 85 km/h.")
+        await tab.until("document.querySelector('.speed .unit').textContent === 'km/h'")
 
     desk.run(check())
 
@@ -316,6 +363,53 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
 
     with driving("following", planner="onboard") as drive:
+        desk.run(check(drive))
+
+
+def test_a_phone_is_enough_to_answer_and_to_take_the_wheel(desk: Desk) -> None:
+    async def check(drive: Drive) -> None:
+        tab = desk.tab
+        await tab.open(drive.url, PHONE, scheme="dark")
+        await tab.until("document.getElementById('speed').textContent !== '–'")
+        await asked(tab, "Drive at 8O km/h.")
+        for part in ("#yes", "#no", "#heard-words", ".wish .why", "#road", "#speed"):
+            assert await tab.value(f"({SEEN})({json.dumps(part)})"), part
+        assert await tab.value(AUDIT) == []
+        await tab.click("#no")
+        await tab.until("document.getElementById('notes').textContent.includes('Then I do not.')")
+        await tab.click("#take-over")
+        await tab.until("!document.getElementById('pad').hidden")
+        assert await tab.value(AUDIT) == [] and "You drive" in await text(tab, "level")
+        await tab.click("[data-hand=faster]")
+        await asyncio.to_thread(drive.until, "the hand", lambda: Hand("faster") in drive.told)
+        await tab.click("#take-over")
+        await tab.until("document.getElementById('pad').hidden")
+        assert [told.on for told in drive.told if isinstance(told, TakeOver)] == [True, False]
+        assert not tab.troubles
+
+    with driving("following", planner="onboard") as drive:
+        desk.run(check(drive))
+
+
+def test_a_drive_through_a_town_shows_where_it_goes_how_far_and_how_long(desk: Desk) -> None:
+    pytest.importorskip("libsumo", reason="needs the extra `town`")
+
+    async def check(drive: Drive) -> None:
+        tab = desk.tab
+        await tab.open(drive.url, PHONE)
+        await tab.until("document.getElementById('speed').textContent !== '–'")
+        await sent(tab, "Take me to the church.")
+        shown = "document.getElementById('level').textContent"
+        await tab.until(f"/^To St. Mary's Church, [0-9.]+ k?m, about [0-9]+ (s|min)$/.test({shown})")
+        wish = drive.wish("Take me to the church.").wish
+        await sent(tab, "Why are we standing?")
+        await tab.until("document.querySelector('.wish:first-child .state')?.textContent.includes('Done')")
+        assert await tab.value("document.querySelector('.wish:first-child .why').textContent")
+        await asyncio.to_thread(drive.until, "the way", lambda: drive.scene.goal is not None and drive.scene.goal.lanes)
+        assert drive.scene.wish == wish and drive.scene.goal.left_s > 0.0
+        assert not tab.troubles
+
+    with driving("town", planner="onboard") as drive:
         desk.run(check(drive))
 
 

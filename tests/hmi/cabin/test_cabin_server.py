@@ -153,7 +153,9 @@ def test_a_late_screen_gets_everything_that_still_holds(cabin: Cabin) -> None:
             road = messages[1]
             assert [lane["i"] for lane in road["lanes"]] == [0, 1, 2]
             assert {line["s"] for line in road["lines"]} == {"solid", "dashed"}
-            assert [surface["e"] for surface in road["surfaces"]] == [False, False, True]
+            assert [surface["k"] for surface in road["surfaces"]] == ["emergency", "driving", "driving"], (
+                "bottom to top"
+            )
             cabin.tell(Answered("heard"))
             cabin.tell(Answered("how_was_it"))
             await hear(screen, "answered", question="how_was_it")

@@ -20,9 +20,9 @@ from chauffeur.bench.openloop.driving import COMMANDS  # noqa: E402
 from chauffeur.bench.openloop.frames import FramesConfig  # noqa: E402
 from chauffeur.bench.openloop.nuscenes import NuScenesTables  # noqa: E402
 from chauffeur.bench.openloop.requests import opening, question  # noqa: E402
-from chauffeur.bench.openloop.waypoint_parser import read_waypoints  # noqa: E402
 from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_file, write_tables  # noqa: E402
 from chauffeur.concept import ConfigError, DataError  # noqa: E402
+from chauffeur.foreign.waypoints import read_waypoints  # noqa: E402
 from chauffeur.models.net.vision import VisionConfig  # noqa: E402
 from chauffeur.models.vilad.frames_answerer import FramesAnswerer  # noqa: E402
 from chauffeur.models.vilad.frames_baselines import FOLDS, expected_paths, strangers_paths, train_status_mlp  # noqa: E402

@@ -11,11 +11,11 @@ import pytest
 pytest.importorskip("libsumo", reason="needs the extra `town`")
 pytest.importorskip("osqp", reason="needs the extra `motion`")
 
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Instruction, Limits, PlanRequest, Scenario, SystemMessage, Trajectory
 from chauffeur.describe.dispatch import describe
 from chauffeur.driving.actuate import actuate
 from chauffeur.driving.episode import drive_policy
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.planning import checked
 from chauffeur.executors.trajectory import TrajectoryExecutor
 from chauffeur.geometry import Pose

@@ -92,8 +92,10 @@ def _ratio(part: Sequence[int], whole: Sequence[int]) -> Any:
 
 
 def _score(name: str, part: Sequence[int], whole: Sequence[int], unit: str = "", digits: int = 3) -> Measure:
-    title = name.replace("-", " ")
-    return register(Measure(f"alignment-{name}-v1", title, _confusion, unit, _ratio(part, whole), digits))
+    title, better = name.replace("-", " "), "" if unit else "higher"
+    return register(
+        Measure(f"alignment-{name}-v1", title, _confusion, unit, _ratio(part, whole), digits, better=better)
+    )
 
 
 SCORES: Final = (
@@ -120,6 +122,7 @@ class FaithfulnessBenchmark(Unasked):
 
     id = JUDGE
     row = FaithfulnessRow
+    drives = False
     tables = (*map(_table, SETS), TableSpec("The judge", SCORES, "set", SETS, heads=("set", "cases"), total=False))
 
     def __init__(self, items: int = COUNT, seed: int = SEED) -> None:

@@ -14,6 +14,7 @@ from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
 from chauffeur.planners.base import Answerer, Planner, Prose
 from chauffeur.planners.llm_errors import EndpointError, Kind
 from chauffeur.planners.prompts import Message
+from chauffeur.planners.transcript import Turn, kept_turns
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,11 +86,12 @@ class Halt:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A plan or words, or why there are none, and what that cost."""
+    """A plan or words, or why there are none, what that cost, and the last conversation with the model about it."""
 
     reply: Reply | None
     error: str
     bill: Bill
+    turns: tuple[Turn, ...] = ()
 
 
 @dataclass(slots=True)
@@ -126,11 +128,14 @@ class Caller:
         bill = Bill()
         last = ""
         failures = refusals = 0
+        turns: list[Turn] = []
         while (sent_s := await self._turn()) is not None:
-            outcome = await self._call(request, sent_s, bill)
+            with kept_turns() as heard:
+                outcome = await self._call(request, sent_s, bill)
+            turns = heard
             if isinstance(outcome, Reply):
                 self._fruitless = 0
-                return Answer(outcome, "", bill)
+                return Answer(outcome, "", bill, tuple(turns))
             last = str(outcome)
             refused = isinstance(outcome, EndpointError) and outcome.kind == "rate_limit"
             refusals += refused
@@ -138,12 +143,12 @@ class Caller:
             again = failures < self.patience.attempts and refusals < self.patience.refusals
             if not (outcome.retryable and again and _asked_s(outcome) <= TOO_LONG_S):
                 self._given_up(outcome)
-                return Answer(None, last, bill)
+                return Answer(None, last, bill, tuple(turns))
             self.repeated += isinstance(outcome, EndpointError) and outcome.kind == "timeout"
             if not refused:
                 wait_s = min(self.patience.cap_s, self.patience.base_s * 2.0 ** (failures - 1))
                 await asyncio.sleep(wait_s * float(self.rng.uniform(0.5, 1.0)))
-        return Answer(None, last, bill) if last else None
+        return Answer(None, last, bill, tuple(turns)) if last else None
 
     async def _turn(self) -> float | None:
         """Wait for a place and for room in the budget; when the call is sent, or None when none may be any more."""

@@ -7,6 +7,7 @@ that fails is a row that says so; only a full disk, a dead engine or the person 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -25,6 +26,7 @@ from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context, Scenario
 from chauffeur.describe import describe
 from chauffeur.driving.episode import make_world
+from chauffeur.planners.transcript import Turn
 
 Watch = Callable[[Standing], None]
 """Is told where the run stands, a few times a second."""
@@ -47,6 +49,7 @@ class Pipeline:
         scribe: Who writes.
         watch: Who is told.
         most: Planner calls in flight at most.
+        rows: Makes an item's rows, to be looked at while the run goes on.
     """
 
     stages: StageStore[Any]
@@ -55,6 +58,7 @@ class Pipeline:
     scribe: Scribe
     watch: Watch
     most: int
+    rows: Callable[[Any], list[Row]]
     _contexts: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
     _drives: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
     _count: dict[str, int] = field(default_factory=dict[str, int])
@@ -95,10 +99,16 @@ class Pipeline:
         """Do what is to be done with an item's answer."""
         job = self.stages.job(item)
         if job is not None:
-            group.create_task(self._finish(job))
+            group.create_task(self._finish(item, job))
             return
         self._count["done"] += 1
         self._fresh += fresh
+        self._show(item)
+
+    def _show(self, item: BenchItem) -> None:
+        """Keep an item's rows as they are now. Whatever is wrong with them is said when the run is scored."""
+        with suppress(Exception):
+            self.scribe.write(self.stages.live, {"item": item.id, "rows": self.rows(item)})
 
     async def _ask(self, todo: deque[BenchItem], caller: Caller, group: asyncio.TaskGroup) -> None:
         while todo and caller.halt is None:
@@ -125,6 +135,8 @@ class Pipeline:
                 return None
             before.add(answer.bill)
             row["error"] = answer.error
+            if turns := [*desk.turns, *answer.turns]:
+                row["turns"] = [self._kept(turn) for turn in turns]
             if answer.reply is not None:
                 row["plan"] = asdict(answer.reply)
         except EngineError:
@@ -138,6 +150,16 @@ class Pipeline:
             row |= {"plan": None, "error": f"The planner's answer cannot be stored: {error}."}
             self.scribe.write(self.stages.plans, row)
         return row
+
+    def _kept(self, turn: Turn) -> Row:
+        """A turn as it is stored; a system message, which items share, is stored once and named by its hash."""
+        if turn["role"] != "system":
+            return {**turn}
+        text = turn["text"].encode("utf-8", "replace").decode()
+        name = hashlib.sha256(text.encode()).hexdigest()[:16]
+        if name not in self.stages.systems.rows:
+            self.scribe.write(self.stages.systems, {"sha256": name, "text": text})
+        return {"role": "system", "sha256": name}
 
     async def context(self, scenario: Scenario) -> Context:
         """C of a scene, described once. Raises ChauffeurError when it cannot be set up."""
@@ -163,7 +185,7 @@ class Pipeline:
         self.scribe.write(self.stages.contexts, row)
         return row
 
-    async def _finish(self, job: BenchJob) -> None:
+    async def _finish(self, item: BenchItem, job: BenchJob) -> None:
         row = self.stages.rollouts.rows.get(job.key)
         if row is None or row["infra_failed"]:  # what the machine spoiled is driven again
             task = self._drives.get(job.key)
@@ -178,6 +200,7 @@ class Pipeline:
         success, collision = (False, False) if tally is None else tally(row)
         self._count["successes"] += success
         self._count["collisions"] += collision
+        self._show(item)
 
     async def _drive(self, job: BenchJob) -> Row:
         try:
@@ -215,11 +238,12 @@ class Pipeline:
 
 @dataclass(slots=True)
 class _Desk:
-    """See RequestDesk; what earlier turns cost is put on the item's bill."""
+    """See RequestDesk; what earlier turns cost is put on the item's bill, and what was said is kept."""
 
     pipeline: Pipeline
     caller: Caller
     bill: Bill
+    turns: list[Turn] = field(default_factory=list[Turn])
 
     async def context(self, scenario: Scenario) -> Context:
         return await self.pipeline.context(scenario)
@@ -229,6 +253,7 @@ class _Desk:
         if answer is None:
             return None
         self.bill.add(answer.bill)
+        self.turns.extend(answer.turns)
         return answer.reply
 
 

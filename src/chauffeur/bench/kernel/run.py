@@ -166,9 +166,10 @@ class BenchRun:
             except BaseExceptionGroup as group:
                 raise first_error(group) from group
             finally:
-                for store in self.stages.stores:
+                for store in (*self.stages.stores, self.stages.live):
                     store.close()
             rows = self.score()
+            self.stages.live.clear()
         vain = self._undriven()
         if self.halt is None and self.manifest.shard == WHOLE and self._all(vain):
             raise BenchError(
@@ -200,7 +201,8 @@ class BenchRun:
         whole = False
         try:
             await engine.start()
-            pipeline = Pipeline(self.stages, engine, caller, scribe, watch, effort.concurrency)
+            self.stages.live.clear()
+            pipeline = Pipeline(self.stages, engine, caller, scribe, watch, effort.concurrency, self._rows)
             await pipeline.work(broken)
             whole = True
         finally:
@@ -231,6 +233,19 @@ class BenchRun:
             effort.patience,
         )
 
+    @property
+    def about(self) -> Row:
+        """Fields of the run that stand in every row."""
+        about: Row = {"bench": self.benchmark.id, "chauffeur": __version__, "labels": list(self.manifest.labels)}
+        if self._planner is not None:
+            about |= {"planner": self._planner.id, "model": self._planner.model}
+        return about
+
+    def _rows(self, item: Any) -> list[Row]:
+        """An item's rows, from what is stored of it; what only all rows together tell is not in them."""
+        rows = self.benchmark.rows(self.stages.outcome(item))
+        return [{"item": item.id} | self.about | _fields(row) for row in rows]
+
     def score(self) -> list[Row]:
         """All rows, from what is stored; written to `results.jsonl`, with `table.md`, `report.json` and
         `provenance.json`.
@@ -238,14 +253,7 @@ class BenchRun:
         Raises:
             DataError: They cannot be written.
         """
-        about: Row = {"bench": self.benchmark.id, "chauffeur": __version__, "labels": list(self.manifest.labels)}
-        if self._planner is not None:
-            about |= {"planner": self._planner.id, "model": self._planner.model}
-        found = [
-            {"item": item.id} | about | _fields(row)
-            for item in self.items
-            for row in self.benchmark.rows(self.stages.outcome(item))
-        ]
+        found = [row for item in self.items for row in self._rows(item)]
         if isinstance(self.benchmark, ComparesRows):
             found = [dict(row) for row in self.benchmark.together(found)]
         lines = [json.dumps(row, ensure_ascii=True) for row in found]

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Final, Generic, Self, TypeVar
 
 from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob, Benchmark, ItemOutcome
 from chauffeur.bench.kernel.shards import WHOLE, Shard
@@ -18,6 +18,9 @@ from chauffeur.concept import DataError
 from chauffeur.concept.data import parse_json
 
 T = TypeVar("T", bound=BenchItem)
+
+LIVE: Final = "live.jsonl"
+"""File of the rows of a run that has not been scored yet."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,8 @@ class StageStore(Generic[T]):
         contexts: C by scene.
         plans: Answers, or why there is none, by item.
         rollouts: What the jobs gave, by the key of what decided it.
+        systems: System messages that models were given, by their hash; answers name them.
+        live: Rows of the items done so far, to be looked at while the run goes on; `results.jsonl` takes its place.
     """
 
     benchmark: Benchmark[T]
@@ -146,6 +151,8 @@ class StageStore(Generic[T]):
     contexts: RowStore
     plans: RowStore
     rollouts: RowStore
+    systems: RowStore
+    live: RowStore
     _jobs: dict[str, tuple[Row | None, BenchJob | None]] = field(
         default_factory=dict[str, "tuple[Row | None, BenchJob | None]"]
     )
@@ -159,12 +166,14 @@ class StageStore(Generic[T]):
             RowStore(folder / "contexts.jsonl", "sample"),
             RowStore(folder / "generate.jsonl", "item"),
             RowStore(folder / "rollout.jsonl", "key"),
+            RowStore(folder / "systems.jsonl", "sha256"),
+            RowStore(folder / LIVE, "item", durable=False),
         )
 
     @property
     def stores(self) -> tuple[RowStore, ...]:
-        """All of them."""
-        return self.contexts, self.plans, self.rollouts
+        """All that a resume reads."""
+        return self.contexts, self.plans, self.rollouts, self.systems
 
     def answer(self, item: T) -> Row | None:
         """The item's answer; None when there is none (yet)."""

@@ -11,12 +11,13 @@ import os
 import queue
 import re
 import threading
+import time
 import zlib
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from chauffeur.concept import ChauffeurError, ConfigError, DataError
 from chauffeur.driving.files import publish
@@ -69,9 +70,19 @@ class RowStore:
         damaged: Numbers, from 1, of lines that cannot be read, the torn end of a crash not among them.
     """
 
-    def __init__(self, path: Path, key: str) -> None:
-        """Read a store; an absent file is an empty one. Raises StorageError when it cannot be read."""
+    def __init__(self, path: Path, key: str, *, durable: bool = True) -> None:
+        """Read a store; an absent file is an empty one.
+
+        Args:
+            path: The file.
+            key: The field.
+            durable: Whether a row has to outlast a power cut once it is written.
+
+        Raises:
+            StorageError: It cannot be read.
+        """
         self.path = path
+        self._durable = durable
         self.rows: dict[str, Row] = {}
         self.damaged: list[int] = []
         self.key = key
@@ -126,7 +137,8 @@ class RowStore:
             view = memoryview(lines)
             while view:
                 view = view[os.write(descriptor, view) :]
-            os.fsync(descriptor)
+            if self._durable:
+                os.fsync(descriptor)
         except OSError as error:
             with suppress(OSError):  # the part that was written must not be the start of the next line
                 os.ftruncate(descriptor, self._size)
@@ -161,6 +173,15 @@ class RowStore:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
+
+    def clear(self) -> None:
+        """Begin anew: no rows, no file. Raises StorageError when the file cannot be removed."""
+        self.close()
+        try:
+            self.path.unlink(missing_ok=True)
+        except OSError as error:
+            raise StorageError(f"Cannot remove {self.path}: {error.strerror or error}.") from error
+        self.rows, self.damaged, self._good, self._bad, self._torn = {}, [], [], [], b""
 
     def __enter__(self) -> Self:
         return self
@@ -280,15 +301,41 @@ def sole_writer(folder: Path) -> Generator[None]:
     except OSError as error:
         raise StorageError(f"Cannot use the run folder {folder}: {error.strerror or error}.") from error
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ConfigError(
-                f"Another process is working in {folder}.", hint="Wait for it, or choose another --out folder."
-            ) from error
-        except OSError:  # file systems without locks
-            yield
-            return
+        for last in (False, True):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError as error:
+                if last:
+                    raise ConfigError(
+                        f"Another process is working in {folder}.", hint="Wait for it, or choose another --out folder."
+                    ) from error
+                time.sleep(_GLANCE_S)
+            except OSError:  # file systems without locks
+                break
         yield
     finally:
         os.close(descriptor)
+
+
+_GLANCE_S: Final = 0.05
+"""`is_written` holds the lock for microseconds; a writer that meets it waits so long and tries again."""
+
+
+def is_written(folder: Path) -> bool:
+    """True while a process works in a run folder (`sole_writer`); False where that cannot be told."""
+    try:
+        import fcntl
+
+        descriptor = os.open(folder / ".lock", os.O_RDONLY)
+    except (ImportError, OSError):
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False

@@ -16,12 +16,12 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
-from chauffeur.bench.lampilot.goals import answered_rightly
-from chauffeur.bench.lampilot.metrics import points, ruler_named
 from chauffeur.bench.lampilot.report import JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.concept import ConfigError, PlanRequest
+from chauffeur.driving.judge.goals import answered_rightly
+from chauffeur.driving.judge.metrics import points, ruler_named
 from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway.dblv1 import Item
 

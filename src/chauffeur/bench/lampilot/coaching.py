@@ -26,7 +26,6 @@ from chauffeur.bench.kernel.store import Row, RowStore, StorageError, sole_write
 from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 from chauffeur.bench.lampilot.description import FALLBACK_WORDS, usable_description
 from chauffeur.bench.lampilot.policy_aid import offer
-from chauffeur.bench.referees import referee_for
 from chauffeur.concept import (
     ChauffeurError,
     Context,
@@ -43,6 +42,7 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe
 from chauffeur.driving.episode import drive_program, make_world
+from chauffeur.driving.judge.choice import referee_for
 from chauffeur.driving.planning import Planned, checked, screened_request
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.trips import make_trip, scenario_hash

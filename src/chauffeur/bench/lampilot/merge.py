@@ -10,9 +10,9 @@ from chauffeur.bench.kernel.shards import WHOLE
 from chauffeur.bench.kernel.stages import StageStore
 from chauffeur.bench.kernel.store import Row, RowStore, sole_writer
 from chauffeur.bench.lampilot.frozen import Frozen
-from chauffeur.bench.lampilot.metrics import ruler_named
 from chauffeur.bench.lampilot.results import open_stages, publish_results, results
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.driving.judge.metrics import ruler_named
 from chauffeur.worlds.highway.dblv1 import Item
 
 _AGAIN = "Run its command again; it goes on where it stopped."

@@ -9,8 +9,11 @@ from functools import cache
 from typing import Any
 
 from chauffeur.bench.lampilot.expert import variants
-from chauffeur.bench.lampilot.goals import HeldGoal, OvertakeGoal, make_goal
-from chauffeur.bench.lampilot.metrics import (
+from chauffeur.bench.lampilot.rehearsal import RehearsedChoice, rehearse
+from chauffeur.concept import Scenario
+from chauffeur.driving.judge.goals import HeldGoal, OvertakeGoal, make_goal
+from chauffeur.driving.judge.lampilot import GoalJudge
+from chauffeur.driving.judge.metrics import (
     ANY_STOP_M,
     COLLISION_WEIGHT,
     ORIGIN,
@@ -19,9 +22,6 @@ from chauffeur.bench.lampilot.metrics import (
     WEIGHTS,
     points,
 )
-from chauffeur.bench.lampilot.referee import GoalJudge
-from chauffeur.bench.lampilot.rehearsal import RehearsedChoice, rehearse
-from chauffeur.concept import Scenario
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception

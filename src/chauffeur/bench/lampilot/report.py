@@ -10,7 +10,7 @@ import numpy as np
 from chauffeur.bench.kernel.metrics import AnyRow, Better, Measure, TableSpec, count, register, share, whole
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.lampilot.families import FAMILIES
-from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
+from chauffeur.driving.judge.metrics import ORIGIN, ruler_named
 
 NOTHING_DRIVEN: Final = ("refused", "not_driven")
 """Outcomes of items without a drive; no ruler has anything to measure there."""

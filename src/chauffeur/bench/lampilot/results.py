@@ -41,16 +41,21 @@ def results(stages: StageStore[Item], ruler: str) -> list[Row]:
     frozen = stages.manifest
     assert isinstance(frozen, Frozen)
     scorer = LampilotBenchmark(frozen, ruler=ruler)
-    about: Row = {
+    about = about_rows(frozen, scorer.ruler)
+    return [about | row for item in frozen.items for row in scorer.rows(stages.outcome(item))]
+
+
+def about_rows(frozen: Frozen, ruler: str) -> Row:
+    """Fields of a run that stand in every row; `ruler` is a ruler's id."""
+    return {
         "schema": SCHEMA,
-        "metrics": scorer.ruler,
+        "metrics": ruler,
         "planner": frozen.config["planner"],
         "model": frozen.model,
         "data_sha256": frozen.config["data_sha256"],
         "chauffeur": version("chauffeur"),
         "labels": list(frozen.labels),
     }
-    return [about | row for item in frozen.items for row in scorer.rows(stages.outcome(item))]
 
 
 def publish_results(folder: Path, stages: StageStore[Item], rows: list[Row]) -> None:

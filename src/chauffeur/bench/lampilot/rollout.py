@@ -12,10 +12,10 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from chauffeur.bench.lampilot.expert import expert_program
-from chauffeur.bench.lampilot.metrics import ANY_STOP_M
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario
 from chauffeur.driving.episode import Episode, drive_program, drive_without_program
+from chauffeur.driving.judge.lampilot import LampilotReferee
+from chauffeur.driving.judge.metrics import ANY_STOP_M
 from chauffeur.driving.planning import checked
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.library import standalone

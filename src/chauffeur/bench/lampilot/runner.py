@@ -10,13 +10,13 @@ from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
-from chauffeur.bench.lampilot.metrics import ruler_named
 from chauffeur.bench.lampilot.rehearsal import label
 from chauffeur.bench.lampilot.requests import PlainRequests, Requests
-from chauffeur.bench.lampilot.results import publish_results, results
+from chauffeur.bench.lampilot.results import about_rows, publish_results, results
 from chauffeur.bench.lampilot.rollout import BASELINES
 from chauffeur.bench.lampilot.scenes import annotated
 from chauffeur.concept import ConfigError
+from chauffeur.driving.judge.metrics import ruler_named
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting
 from chauffeur.safety.shield import SHIELD_VERSION
@@ -76,6 +76,10 @@ class LampilotRun(BenchRun):
         """
         self._bench.ruler = ruler_named(ruler).id
         return super().run(watch, effort)
+
+    @property
+    def about(self) -> Row:
+        return about_rows(self._bench.frozen, self._bench.ruler)
 
     def score(self) -> list[Row]:
         """One row per planned item, from what is stored; written to `results.jsonl`, the table to `table.md`.

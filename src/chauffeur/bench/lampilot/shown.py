@@ -11,13 +11,10 @@ from pydantic import ValidationError
 from chauffeur.bench.kernel.metrics import AnyRow
 from chauffeur.bench.kernel.pipeline import context_adapter
 from chauffeur.bench.lampilot.expert import expert_program
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S
-from chauffeur.bench.lampilot.metrics import points, ruler_named
-from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.report import NOTHING_DRIVEN
 from chauffeur.bench.lampilot.rollout import BASELINES, drive_policy, plan_adapter
 from chauffeur.bench.report.gallery import MakeCard
-from chauffeur.bench.report.model import Card
+from chauffeur.bench.report.model import Card, ShownDrive
 from chauffeur.bench.report.runs import Run
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
@@ -34,6 +31,9 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
+from chauffeur.driving.judge.goals import GIVE_UP_S, HOLD_S
+from chauffeur.driving.judge.lampilot import LampilotReferee
+from chauffeur.driving.judge.metrics import points, ruler_named
 from chauffeur.driving.planning import Planned
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.driving.trips import make_trip
@@ -200,14 +200,12 @@ def _valid(adapter: Any, value: Any) -> Any:
         return None
 
 
-def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[RecordedTrip | None, str]:
+def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> ShownDrive:
     """Drive a row's item again.
 
     Returns:
         The recorded drive and what is to be said of it; no drive, and why, where none can be had.
     """
-    if row["outcome"] in NOTHING_DRIVEN or not row.get("steps"):
-        return None, "Nothing was driven."
     plan = kept.plan(row)
     world = HighwayWorld()
     try:
@@ -226,7 +224,7 @@ def drive_again(row: AnyRow, scenario: Scenario, kept: KeptDrive) -> tuple[Recor
     if (episode.outcome, episode.ticks) != (row["outcome"], row["steps"]):
         again = ending_words({"outcome": episode.outcome, "success": episode.success, "steps": episode.ticks})
         note = (
-            f"Driven again for this report, it ended differently: {again}. Another version or machine made the run, or "
+            f"Driven again, it ended differently: {again}. Another version or machine made the run, or "
             "the program ran out of computing time there."
         )
     context = kept.context(row) or describe(observation)
@@ -263,12 +261,9 @@ def cards(run: Run, data: Path | None) -> MakeCard:
 
     def card(row: AnyRow) -> Card:
         scene, plan = kept.scene(row), kept.plan(row)
-        if scene is None:
-            known = row["outcome"] in NOTHING_DRIVEN
-            drive, note = None, "Nothing was driven." if known else "The run kept no scenes; name its data with --data."
-        else:
-            drive, note = drive_again(row, scene, kept)
-        context = kept.context(row) or (drive.trip.context if drive is not None else None)
+        driven = row["outcome"] not in NOTHING_DRIVEN and bool(row.get("steps"))
+        note = "The run kept no scenes; name its data with --data." if driven else "Nothing was driven."
+        context = kept.context(row)
         ending, *why = happened(row)
         return Card(
             item=str(row["item"]),
@@ -282,8 +277,8 @@ def cards(run: Run, data: Path | None) -> MakeCard:
             thoughts="" if plan is None else plan.thoughts.text,
             program=plan.policy if plan is not None and isinstance(plan.policy, Program) else None,
             verdicts=kept.verdicts(row),
-            drive=drive,
-            drive_note=note,
+            drive=None if scene is None or not driven else lambda: drive_again(row, scene, kept),
+            drive_note="" if driven and scene is not None else note,
         )
 
     return card

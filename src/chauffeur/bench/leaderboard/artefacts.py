@@ -14,6 +14,9 @@ from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError
 from chauffeur.geometry import RoadGraph
+from chauffeur.hmi.road import draw_road, track_box
+from chauffeur.hmi.stills import LOOKS, Shape, road_shapes, style_of_looks, svg_of
+from chauffeur.hmi.view import as_picture
 from chauffeur.worlds.town.library import load
 
 WIDE_PX: Final = 900
@@ -50,49 +53,39 @@ def route_map(
         infractions: What was broken; numbered in the order of time.
         title, note: Two lines above it; the note names the engine.
     """
-    xs = [one.x_m for one in track.poses] + [x for x, _ in path]
-    ys = [one.y_m for one in track.poses] + [y for _, y in path]
-    left, right = min(xs) - _MARGIN_M, max(xs) + _MARGIN_M
-    low, high = min(ys) - _MARGIN_M, max(ys) + _MARGIN_M
-    scale = WIDE_PX / (right - left)
-    tall = (high - low) * scale
+    way = tuple((one.x_m, -one.y_m) for one in track.poses)
+    driven = tuple((x, -y) for x, y in path)
+    box = track_box((*way, *driven)).grown(_MARGIN_M)
+    wide, high = box.x1 - box.x0, box.y1 - box.y0
+    tall = high * WIDE_PX / wide
     placed = [one for one in infractions if one.kind != "outside_route_lanes"]
     legend = [f"{i}  {_LABELS[one.kind][0]}, {one.time_s:.0f} s" for i, one in enumerate(placed, 1)]
     legend += [f"{100.0 * one.share:.1f} % outside the lanes" for one in infractions if one not in placed]
-
-    def at(x: float, y: float) -> str:
-        return f"{(x - left) * scale:.1f},{_HEAD_PX + (high - y) * scale:.1f}"
-
-    def line(points: Sequence[tuple[float, float]], style: str) -> str:
-        return f'<polyline points="{" ".join(at(x, y) for x, y in points)}" fill="none" {style}/>'
-
+    dot = wide / 100.0
+    shapes = [
+        *road_shapes(draw_road(as_picture(road, ())[0], (), box)),
+        Shape("line", "", way, max(2.4, 0.5 * dot), paint="#7fa6d6"),
+        *([Shape("line", "trail", driven, max(0.4, 0.2 * dot))] if len(driven) > 1 else []),
+    ]
+    for name, place in (("start", way[0]), ("goal", way[-1])):
+        shapes.append(Shape("dot", "place", (place,), 0.6 * dot))
+        shapes.append(Shape("text", "place", ((place[0] + dot, place[1] - dot),), 1.6 * dot, name, start=True))
+    for i, one in enumerate(placed, 1):
+        shapes.append(Shape("dot", "", ((one.x_m, -one.y_m),), dot, paint=_LABELS[one.kind][1]))
+        shapes.append(Shape("text", "plate", ((one.x_m, -one.y_m),), 1.3 * dot, str(i)))
     bottom = _HEAD_PX + tall + _LINE_PX * (len(legend) + 2)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDE_PX}" height="{bottom:.0f}" '
-        f'viewBox="0 0 {WIDE_PX} {bottom:.0f}" font-family="sans-serif" font-size="13">',
+        f'viewBox="0 0 {WIDE_PX} {bottom:.0f}" font-family="sans-serif" font-size="13">{style_of_looks()}',
         f'<rect width="{WIDE_PX}" height="{bottom:.0f}" fill="#ffffff"/>',
         f'<text x="10" y="22" font-size="17" font-weight="bold">{escape(title)}</text>',
         f'<text x="10" y="42" fill="#555">{escape(note)}</text>',
         f'<svg y="{_HEAD_PX}" width="{WIDE_PX}" height="{tall:.1f}" '
-        f'viewBox="0 {_HEAD_PX} {WIDE_PX} {tall:.1f}" overflow="hidden">',
+        f'viewBox="{box.x0:.1f} {box.y0:.1f} {wide:.1f} {high:.1f}" overflow="hidden">',
+        f'<rect x="{box.x0:.1f}" y="{box.y0:.1f}" width="100%" height="100%" fill="{LOOKS["ground"]}"/>',
+        svg_of(shapes),
+        "</svg>",
     ]
-    for lane in road.lanes:
-        points = lane.centre.points_m
-        if lane.kind == "driving" and any(left < x < right and low < y < high for x, y in points):
-            parts.append(line(points, f'stroke="#d8d8d8" stroke-width="{lane.width_m * scale:.1f}"'))
-    way = [(one.x_m, one.y_m) for one in track.poses]
-    parts.append(line(way, f'stroke="#9ecae1" stroke-width="{max(4.0, 2.4 * scale):.1f}" stroke-linecap="round"'))
-    if len(path) > 1:
-        parts.append(line(path, 'stroke="#08519c" stroke-width="1.6"'))
-    for name, pose in (("start", track.poses[0]), ("goal", track.poses[-1])):
-        x, y = at(pose.x_m, pose.y_m).split(",")
-        parts.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{"#2a9d8f" if name == "start" else "#264653"}"/>')
-        parts.append(f'<text x="{float(x) + 8:.1f}" y="{float(y) - 6:.1f}" font-weight="bold">{name}</text>')
-    for i, one in enumerate(placed, 1):
-        x, y = at(one.x_m, one.y_m).split(",")
-        parts.append(f'<circle cx="{x}" cy="{y}" r="9" fill="{_LABELS[one.kind][1]}" stroke="#fff"/>')
-        parts.append(f'<text x="{x}" y="{float(y) + 4:.1f}" fill="#fff" font-size="11" text-anchor="middle">{i}</text>')
-    parts.append("</svg>")
     for i, text in enumerate(legend or ["No rule was broken."]):
         y = _HEAD_PX + tall + _LINE_PX * (i + 1.2)
         parts.append(f'<text x="10" y="{y:.0f}">{escape(text)}</text>')

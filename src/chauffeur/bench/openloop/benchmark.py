@@ -29,11 +29,12 @@ from chauffeur.bench.openloop.conventions import (
     standing,
 )
 from chauffeur.bench.openloop.extrapolation import constant_velocity
-from chauffeur.bench.openloop.nuscenes import FUTURE, NuScenesTables, PlanningSample
-from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question, with_wish
-from chauffeur.bench.openloop.waypoint_parser import READING, read_waypoints
+from chauffeur.bench.openloop.nuscenes import NuScenesTables, PlanningSample
+from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.foreign.waypoints import FUTURE, READING, read_waypoints
 from chauffeur.planners.base import Prose
+from chauffeur.planners.prompts.waypoints import with_wish
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

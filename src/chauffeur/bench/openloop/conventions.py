@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
-from chauffeur.bench.openloop.nuscenes import FUTURE
+from chauffeur.foreign.waypoints import FUTURE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

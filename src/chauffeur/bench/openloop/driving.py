@@ -13,11 +13,11 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from chauffeur.bench.openloop.nuscenes import STEP_S
 from chauffeur.concept import Observation, Scenario, VehicleState
 from chauffeur.concept.scene import stops_at_sign
 from chauffeur.driving.actuate import actuate
 from chauffeur.driving.episode import make_world
+from chauffeur.foreign.waypoints import STEP_S
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.road_graph import turn_of
 from chauffeur.worlds.base import EGO, World

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
-from chauffeur.bench.openloop.nuscenes import FUTURE, STEP_S
+from chauffeur.foreign.waypoints import FUTURE, STEP_S
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

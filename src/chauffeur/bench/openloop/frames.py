@@ -23,13 +23,15 @@ import numpy as np
 
 from chauffeur.bench.openloop.driving import AXLE_M, TOWNS, UNSEEN_TOWN, FrameMoment, Place, TrafficTrip, instants
 from chauffeur.bench.openloop.extrapolation import FutureKind, kind_of, tells_nothing
-from chauffeur.bench.openloop.nuscenes import FUTURE, HISTORY, in_frame
+from chauffeur.bench.openloop.nuscenes import in_frame
 from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_file, sample_token, write_tables
 from chauffeur.bench.sets import claim
 from chauffeur.camera import Camera, Conditions, Rig
 from chauffeur.concept import ConfigError, ScenarioError
 from chauffeur.driving.files import publish
+from chauffeur.foreign.waypoints import FUTURE
 from chauffeur.geometry import Pose
+from chauffeur.planners.prompts.waypoints import HISTORY
 
 if TYPE_CHECKING:
     from chauffeur.camera import Renderer

@@ -28,6 +28,8 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from chauffeur.concept import DataError
+from chauffeur.foreign.waypoints import FUTURE, STEP_S
+from chauffeur.planners.prompts.waypoints import HISTORY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,11 +37,6 @@ if TYPE_CHECKING:
     FloatArray = NDArray[np.float64]
 
 TABLES: Final = ("scene", "sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor")
-STEP_S: Final = 0.5
-HISTORY: Final = 4
-"""Samples before the present one: 2 s."""
-FUTURE: Final = 6
-"""Waypoints: 3 s."""
 MOST_OFF_S: Final = 0.2
 """nuScenes' key frames are the LIDAR sweeps (20 Hz) closest to every half second, and sweeps are lost at times."""
 USUALLY_OFF_S: Final = 0.05

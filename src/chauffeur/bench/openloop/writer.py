@@ -10,8 +10,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.bench.openloop.nuscenes import CAMERA, MARKS, STEP_S, OpenLoopMark
+from chauffeur.bench.openloop.nuscenes import CAMERA, MARKS, OpenLoopMark
 from chauffeur.driving.files import publish
+from chauffeur.foreign.waypoints import STEP_S
 
 if TYPE_CHECKING:
     from chauffeur.camera import Camera

@@ -12,7 +12,7 @@ from chauffeur.bench.kernel.report import ALL, Line, ResultTable, fill, stored_t
 from chauffeur.bench.report.gallery import PICKED, make_gallery
 from chauffeur.bench.report.model import BenchReport, FlipList, Gallery
 from chauffeur.bench.report.pairs import flip_list, pair_table, pairs_of
-from chauffeur.bench.report.runs import Run, benchmark_kind, load_runs, on_common_items, specs_of
+from chauffeur.bench.report.runs import Run, benchmark_kind, load_runs, on_common_items, simulated, specs_of
 from chauffeur.concept import ConfigError, DataError
 
 PICKED_IN_ALL = 24
@@ -70,7 +70,11 @@ def read_runs(folders: Sequence[Path], metrics: str = "") -> tuple[Sequence[Run]
     return runs, kind
 
 
-def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) -> BenchReport:
+def untold(what: str, done: int, total: int) -> None:
+    """Progress that nobody follows."""
+
+
+def build_report(folders: Sequence[Path], choices: Choices, progress: Progress = untold) -> BenchReport:
     """Read runs and say what came of them.
 
     Raises:
@@ -108,7 +112,7 @@ def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) 
         galleries=galleries,
         facts=tuple((run.name, _facts(run)) for run in runs),
         labels=tuple(dict.fromkeys(label for run in runs for label in run.labels)),
-        simulated=getattr(kind, "asks", "") != "words",
+        simulated=simulated(kind),
     )
 
 

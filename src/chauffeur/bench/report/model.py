@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,9 @@ def said(name: str, labels: tuple[str, ...]) -> str:
 
 
 _ASKED = ("command", "wish", "instruction", "text", "words", "question")
-_ENDED = ("outcome", "status", "answer", "topic", "chosen")
+_ENDED = ("outcome", "status", "answer", "topic", "chosen", "label")
+_RESULTS = {"success": "done", "failure": "not done", "refused": "declined"}
+"""Stored outcomes that have another word where people read."""
 _SHORT = 80
 """Longest text that is a fact and no prose."""
 
@@ -30,10 +32,10 @@ def asked_words(row: Mapping[str, Any]) -> str:
     return next((str(row[name]) for name in _ASKED if row.get(name)), str(row["item"]))
 
 
-def ending_words(row: Mapping[str, Any]) -> str:
-    """Short words for a row's ending."""
+def ending_words(row: Mapping[str, Any], otherwise: str = "not as it should be") -> str:
+    """Short words for a row's ending; `otherwise` where the row tells none."""
     found = (str(row[name]) for name in _ENDED if row.get(name))
-    return next((text.replace("_", " ") for text in found if len(text) <= _SHORT), "not as it should be")
+    return next((_RESULTS.get(text, text.replace("_", " ")) for text in found if len(text) <= _SHORT), otherwise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,10 @@ class FlipList:
     left_out: int
 
 
+ShownDrive = tuple[RecordedTrip | None, str]
+"""A drive and what is to be said of it; no drive, and why."""
+
+
 @dataclass(frozen=True, slots=True)
 class Card:
     """A row that is not as it should be, with what its run kept to understand why.
@@ -83,8 +89,9 @@ class Card:
         thoughts: R; empty where there is none.
         program: P; None for baselines, refusals and answers in words.
         verdicts: What the checks said.
-        drive: The drive, driven again with recording; None where there is none to show.
-        drive_note: Why there is none, or what is to be said of it.
+        drive: Gives the drive, e.g. by driving it again with recording, and what is to be said of it; None where there
+            is none to show.
+        drive_note: Why there is none.
         elsewhere: How other runs fared with the same item, as (run, words).
     """
 
@@ -99,7 +106,7 @@ class Card:
     thoughts: str = ""
     program: Program | None = None
     verdicts: tuple[Verdict, ...] = ()
-    drive: RecordedTrip | None = None
+    drive: Callable[[], ShownDrive] | None = None
     drive_note: str = ""
     elsewhere: tuple[tuple[str, str], ...] = ()
 

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast, get_type_hints
+from typing import Any, Literal, cast, get_type_hints
 
 from chauffeur.bench.kernel.benchmark import GROUP
 from chauffeur.bench.kernel.metrics import TableSpec
-from chauffeur.bench.kernel.store import Row, unseal
-from chauffeur.concept import ConfigError, DataError
+from chauffeur.bench.kernel.stages import LIVE
+from chauffeur.bench.kernel.store import Row, is_written, unseal
+from chauffeur.concept import ChauffeurError, ConfigError, DataError
 from chauffeur.concept.data import parse_json
 from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.planners.transcript import Turn
 
 _AGAIN = "Run the same chauffeur bench command again; it goes on where it stopped."
+
+RunState = Literal["running", "unfinished", "finished"]
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One finished run.
+    """One run; of one that goes on, or was killed, what it has done so far.
 
     Attributes:
         name: What the run is called in tables; unlike any other run's of the report.
@@ -32,6 +36,7 @@ class Run:
         provenance: Content of `provenance.json`; empty where there is none.
         stored: Content of `report.json`; empty where there is none.
         labels: What must be said wherever the run is shown, e.g. `critic: evaluator`.
+        state: `running` while a process works in the folder, `unfinished` where items are missing and none does.
     """
 
     name: str
@@ -42,6 +47,7 @@ class Run:
     provenance: Row
     stored: Row
     labels: tuple[str, ...]
+    state: RunState = "finished"
 
     @property
     def said(self) -> str:
@@ -52,6 +58,11 @@ class Run:
     def planned(self) -> int:
         """Number of items the run was planned for; for a shard, of the whole run."""
         return int(self.plan.get("planned", len(self.plan["items"])))
+
+    @property
+    def done(self) -> int:
+        """Number of items that have rows."""
+        return len({row["item"] for row in self.rows})
 
     @property
     def config(self) -> Row:
@@ -71,8 +82,8 @@ class Run:
     def stage(self, name: str, key: str) -> dict[str, Row]:
         """Rows of a stage file, e.g. `generate` by `item`, the last row of a key winning; empty where there is none.
 
-        The file is only read: whoever may still be appending to it is not disturbed, and a line that is damaged or
-        not whole yet is left out.
+        The file is only read: a process that still appends to it is not disturbed, and a line that is damaged or not
+        whole yet is left out.
 
         Raises:
             DataError: The file cannot be read.
@@ -85,17 +96,41 @@ class Run:
                 found[str(row[key])] = row
         return found
 
+    def turns(self, answer: Row, systems: Mapping[str, Row]) -> list[Turn]:
+        """The conversation that a row of `generate` keeps, in order; empty where no model was asked in words.
+
+        Args:
+            answer: The row.
+            systems: Rows of the stage `systems` by `sha256`.
+        """
+        found: list[Turn] = []
+        for turn in answer.get("turns") or ():
+            text = turn.get("text", "")
+            if "sha256" in turn:
+                text = (systems.get(str(turn["sha256"])) or {}).get("text", "The run did not keep this message.")
+            found.append({"role": str(turn.get("role", "")), "text": str(text)})
+        return found
+
 
 def benchmark_kind(bench: str) -> Any:
     """The class of the benchmark with an id, out of those that are installed; None where it is not (any more)."""
-    names = sorted((name for name in plugin_names(GROUP) if bench.startswith(name)), key=len, reverse=True)
-    for name in names:
-        found: Any = load_plugin(GROUP, name)
+    # Most ids begin with the name that the benchmark is registered under; only for the others are all imported.
+    for name in sorted(plugin_names(GROUP), key=lambda name: (not bench.startswith(name), -len(name))):
+        try:
+            found: Any = load_plugin(GROUP, name)
+        except ChauffeurError:
+            continue  # a package that cannot be imported is none of this run's
         kind: Any = found if isinstance(found, type) else get_type_hints(found).get("return")
         for one in (kind, *getattr(kind, "__subclasses__", tuple)()):
             if getattr(one, "id", "") == bench:
                 return one
     return None
+
+
+def simulated(kind: Any) -> bool:
+    """True if the figures of a class of benchmarks are results of drives; one that drives nothing says `drives = False`
+    or asks for words."""
+    return bool(getattr(kind, "drives", getattr(kind, "asks", "") != "words"))
 
 
 def specs_of(kind: Any) -> tuple[TableSpec, ...]:
@@ -155,9 +190,15 @@ def load_run(folder: Path) -> Run:
     plan = _json(folder / "plan.json")
     if not isinstance(plan.get("items"), list) or not plan["items"]:
         raise DataError(f"{folder / 'plan.json'} plans no items, so there is nothing to report.")
-    if not (folder / "results.jsonl").is_file():
+    items = [str(item) for item in plan["items"]]
+    # What a run has done so far is newer than the results of an earlier start of it.
+    path = next((folder / name for name in (LIVE, "results.jsonl") if (folder / name).is_file()), None)
+    if path is None:
         raise DataError(f"The run in {folder} is not finished: it has no results.jsonl.", hint=_AGAIN)
-    rows = _rows(folder / "results.jsonl", [str(item) for item in plan["items"]])
+    rows = _rows(path, items, torn=path.name == LIVE)
+    state: RunState = "running" if is_written(folder) else "finished"
+    if state == "finished" and (path.name == LIVE or len({row["item"] for row in rows}) < len(items)):
+        state = "unfinished"
     provenance, stored = (
         _json(folder / name) if (folder / name).is_file() else {} for name in ("provenance.json", "report.json")
     )
@@ -170,19 +211,24 @@ def load_run(folder: Path) -> Run:
         provenance=provenance,
         stored=stored,
         labels=tuple(dict.fromkeys(str(label) for row in rows for label in row.get("labels") or ())),
+        state=state,
     )
 
 
-def _rows(path: Path, planned: list[str]) -> tuple[Row, ...]:
+def _rows(path: Path, planned: list[str], *, torn: bool) -> tuple[Row, ...]:
+    """Rows of a file, in the plan's order; those of an item's last line where it may be `torn`, rows by item."""
     place = {item: number for number, item in enumerate(planned)}
-    found: list[Row] = []
+    lines: dict[str, list[Row]] = {}
     for number, line in enumerate(_text(path).split("\n"), start=1):
         if not line.strip():
             continue
         try:
             row: Any = parse_json(line)
             item = str(row["item"])
+            mine: list[Row] = [one | {"item": item} for one in row["rows"]] if torn else [row]
         except (ValueError, TypeError, KeyError) as error:
+            if torn:
+                continue
             raise DataError(
                 f"{path}, line {number}, is no row of results ({type(error).__name__}: {error}).", hint=_AGAIN
             ) from error
@@ -191,7 +237,8 @@ def _rows(path: Path, planned: list[str]) -> tuple[Row, ...]:
                 f"{path} has a row for {item}, which this run never planned.",
                 hint="Rows of several runs seem mixed in one folder; score each run in its own.",
             )
-        found.append(row)
+        lines[item] = mine if torn else [*lines.get(item, ()), *mine]
+    found = [row for mine in lines.values() for row in mine]
     if not found:
         raise DataError(f"{path} holds no row, so there is nothing to report.", hint=_AGAIN)
     if len(rulers := {str(row.get("metrics", "")) for row in found}) > 1:

@@ -5,19 +5,26 @@ A plan says its acts, or they are those of its intent and calls. What an unsure 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.concept import ASKS, Parameters, Plan, Program, Result, Verdict
+from chauffeur.concept import ASKS, ActionMatrix, Parameters, Plan, Program, Result, Verdict
 from chauffeur.concept.results import undriven
 from chauffeur.concept.utterance import Act, Utterance, Verb
 from chauffeur.driving.events import EventKind
 from chauffeur.driving.judge.acts import NOT_DRIVEN
 from chauffeur.driving.judge.sources import SURE, acts_of, heard
+from chauffeur.geometry.road_graph import TURNS
 from chauffeur.language.meaning.circumstances import circumstance_of, content_of
+from chauffeur.language.meaning.words import act_words
 from chauffeur.worlds.town.pack import PLACE_WORDS
 
 TOLD_NOT_TO_CHECK: Final = "told-not-to-v1"
+_SPOT: Final = re.compile(r"[A-Z]+\d+")
+"""A parking spot's own name: `B6`."""
+_STYLES: Final = ("drive carefully", "drive as usual", "drive quickly")
+"""Setting `style` of a plan of gains, in words."""
 _STANDS: Final[frozenset[Verb]] = frozenset({"stop", "park", "pull_over", "goto"})
 _SERVES: Final[dict[Verb, frozenset[Verb]]] = {
     "turn": frozenset({"turn", "straight"}), "straight": frozenset({"straight", "turn", "go", "keep", "speed"}),
@@ -46,10 +53,23 @@ def unused_of(wish: str, plan: Plan) -> tuple[str, ...]:
     found = [act for act in asked if act.act == "refuse"]
     found += _unserved([act for act in asked if not act.negated and act.act != "refuse"], claimed) if claimed else []
     told = [circumstance_of(act, wish) for act in asked if act not in (*found, *claimed)]
-    parts = [wish[low:high] for low, high in reading.unused if _asks(heard(wish[low:high]))]
-    parts += [words for words in told if words and not _is_known(content_of(words), known)]
+    told += [wish[low:high] for low, high in reading.unused if _asks(heard(wish[low:high]))]
+    parts = [words for words in told if words and not _is_known(content_of(words), known)]
     parts += [wish[act.span[0] : act.span[1]] for act in found if act.span is not None]
     return tuple(sorted(set(parts), key=lambda words: (wish.find(words), words)))
+
+
+def understood_of(plan: Plan) -> tuple[str, ...]:
+    """Things that a plan does, in plain words: its acts, the place that it leads to, or how it drives."""
+    if isinstance(plan.policy, ActionMatrix):
+        return tuple(words for style, words in enumerate(_STYLES) if dict(plan.settings).get("style") == style)
+    if plan.acts or not isinstance(plan.policy, Parameters) or plan.policy.route in ("", *TURNS):
+        return tuple(act_words(act).replace(" —", ",") for act in plan.acts or acts_of(plan))
+    place = plan.policy.route.replace("_", " ")
+    if plan.intent.startswith("park"):
+        where = "in the nearest free spot" if place == "nearest" else f"near the {place}"
+        return (f"park {f'in spot {place}' if _SPOT.fullmatch(place) else where}",)
+    return (f"drive to the {place}",)
 
 
 def _is_known(content: frozenset[str], known: frozenset[str]) -> bool:

@@ -12,10 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
+from chauffeur.concept import PartResult
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.driving.judge import manoeuvres, setpoints, standing
 from chauffeur.driving.judge.conditions import unknown
-from chauffeur.driving.judge.trace import ActResult, DriveTrace, Found, Referents, TracedDrive
+from chauffeur.driving.judge.trace import DriveTrace, Found, Referents, TracedDrive
 
 
 class _Predicate(Protocol):
@@ -47,7 +48,7 @@ class JudgedAct:
     """
 
     act: Act
-    result: ActResult
+    result: PartResult
     why: str = ""
     planned: bool = False
 

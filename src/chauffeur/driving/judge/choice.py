@@ -1,4 +1,4 @@
-"""Who judges a free drive, by what its world can be judged by."""
+"""The judge of a trip: by the goal of its scenario, or by what its world can be judged by."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Final
 
 from chauffeur.concept import Parameters, Plan, Scenario, Trajectory
 from chauffeur.driving.episode import Referee
+from chauffeur.driving.judge.lampilot import LampilotReferee, ScoredReferee
 from chauffeur.driving.judge.referee import ActsReferee
 from chauffeur.driving.judge.sources import acts_for
 from chauffeur.geometry import Pose
@@ -18,7 +19,22 @@ RED_S: Final = 90.0
 """Who drives a trajectory in a town may stand so long on the way: a light's cycle, and people."""
 
 
-def free_referee(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
+def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
+    """The judge of a trip: LaMPilot's by the scenario's own goal, else that of a free drive, else none.
+
+    On a highway world LaMPilot's scores are measured beside a free drive; its success conditions are not.
+
+    Raises:
+        ScenarioError: The scenario's own goal cannot be judged, or there is no such spot.
+    """
+    if not isinstance(world, HighwayWorld):
+        return _free_referee(world, scenario, plan, wish)
+    if scenario.goal:
+        return LampilotReferee(world, scenario)
+    return _acts_referee(world, plan, wish, ScoredReferee)
+
+
+def _free_referee(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
     """The judge of a trip without a goal of its scenario's own; None where nothing says what was to be done.
 
     In a parking lot, the judge of the spot that is meant; in a town, of the place that a plan leads to, which the
@@ -35,11 +51,11 @@ def free_referee(world: World, scenario: Scenario, plan: Plan, wish: str = "") -
         return _in_a_spot(world, route)
     if can.places:
         sent = scenario.config.get("goal") or scenario.config.get("goal_m") or (route and route not in TURNS)
-        return _at_a_place(world) if sent and isinstance(plan.policy, Parameters) else acts_referee(world, plan, wish)
-    return acts_referee(world, plan, wish) if isinstance(world, HighwayWorld) else None
+        return _at_a_place(world) if sent and isinstance(plan.policy, Parameters) else _acts_referee(world, plan, wish)
+    return _acts_referee(world, plan, wish) if isinstance(world, HighwayWorld) else None
 
 
-def acts_referee(
+def _acts_referee(
     world: World, plan: Plan, wish: str, kind: Callable[..., ActsReferee] = ActsReferee
 ) -> ActsReferee | None:
     """The judge of the acts that words mean, or a plan claims; None where none of them can be judged."""

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from chauffeur.concept import PartResult
 from chauffeur.concept.units import M_PER_CAR_LENGTH, M_PER_FOOT, M_PER_KM, M_PER_YARD, MPS_PER_KMH, MPS_PER_MPH
 from chauffeur.concept.utterance import Act, Condition, Event
 from chauffeur.driving.judge.references import ROAD_USERS, WAYSIDE, meant
-from chauffeur.driving.judge.trace import ON_PATH_M, PERIOD_S, ActResult, Passage, TracedDrive
+from chauffeur.driving.judge.trace import ON_PATH_M, PERIOD_S, Passage, TracedDrive
 
 _METRES: Final = {"km": M_PER_KM, "ft": M_PER_FOOT, "yd": M_PER_YARD, "lengths": M_PER_CAR_LENGTH}
 _MPS: Final = {"mph": MPS_PER_MPH, "m/s": 1.0}
@@ -60,7 +61,7 @@ def too_early(drive: TracedDrive, act: Act, begins: int, start: int, passage: Pa
     return why
 
 
-def begin(drive: TracedDrive, act: Act, start: int) -> tuple[int, tuple[ActResult, int, str] | None]:
+def begin(drive: TracedDrive, act: Act, start: int) -> tuple[int, tuple[PartResult, int, str] | None]:
     """The instant from which an act that lasts can be looked for, and what becomes of it where that does not come."""
     if act.when is None or act.when.type in ("while", "until", "before"):
         return start, None

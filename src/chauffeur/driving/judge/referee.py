@@ -11,11 +11,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from chauffeur.concept import JudgedBy, Metric, Outcome, ProgramState, Setpoints
+from chauffeur.concept import JudgedBy, Metric, Outcome, ProgramState, Setpoints, WishPart
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.driving.judge.acts import JudgedAct, judge, wanted
 from chauffeur.driving.judge.setpoints import gap_asked, planned_gap, speed_asked
 from chauffeur.driving.judge.trace import PERIOD_S, DriveTrace, Referents, TracedDrive
+from chauffeur.language.meaning.words import act_words
 from chauffeur.worlds.base import World
 
 SETTLES_S: Final = 12.0
@@ -27,7 +28,6 @@ _STEPS: Final[frozenset[Verb]] = frozenset({"pass", "lane"})
 """What may take several steps: a program that is still at it may have one to go, e.g. coming back."""
 _WAYS: Final[frozenset[Verb]] = frozenset({"turn", "straight"})
 _GAPS: Final[frozenset[Verb]] = frozenset({"gap", "follow", "yield"})
-_NAMES: Final[Mapping[Verb, str]] = {"pass": "Overtake", "lane": "Lane change"}
 
 
 class ActsReferee:
@@ -117,28 +117,14 @@ class ActsReferee:
         return bool(self.judged) and self._is_done
 
     @property
-    def parts_done(self) -> tuple[int, int]:
-        """Acts that were seen to be done, of all."""
-        return sum(one.result == "done" for one in self.judged), len(self.judged)
+    def parts(self) -> tuple[WishPart, ...]:
+        """The acts in plain words, and what became of each."""
+        return tuple(WishPart(one.result, act_words(one.act).replace(" —", ","), one.why) for one in self.judged)
 
     @property
     def judged_by(self) -> JudgedBy:
         """Where the acts come from; the plan, where a number of its own decided."""
         return "plan" if any(one.planned for one in self.judged) else self._source
-
-    @property
-    def shortfall(self) -> str:
-        """What is missing, and what was not compared, in words; empty when nothing is."""
-        missing = sorted(
-            (one for one in self.judged if one.result != "done"), key=lambda one: one.result == "not_judged"
-        )
-        if not missing:
-            return ""
-        first = missing[0]
-        name = _NAMES.get(first.act.act, first.act.act.replace("_", " ").capitalize())
-        why = f"not compared: {first.why}" if first.result == "not_judged" else first.why
-        more = f" {len(missing) - 1} more to do after it." if len(missing) > 1 else ""
-        return f"{name}: {why}.{more}"
 
     def outcome(self) -> Outcome:
         """What came of it, collisions apart: not done by a program that ended, or not in the time there was."""
@@ -151,7 +137,7 @@ class ActsReferee:
 
     def metrics(self) -> tuple[Metric, ...]:
         """Share of the acts that were done, how long it took, and what was asked for and reached in numbers."""
-        done, count = self.parts_done
+        done, count = sum(one.result == "done" for one in self.judged), len(self.judged)
         return (
             Metric("meaning-acts-v1", done / count if count else 0.0, "share", applies=count > 0),
             Metric("meaning-time-v1", self._done_s or 0.0, "s", applies=self._done_s is not None),

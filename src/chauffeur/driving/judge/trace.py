@@ -6,15 +6,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
-from chauffeur.concept import LaneId, Lead, Observation, Setpoints, SignalState, VehicleState
+from chauffeur.concept import LaneId, Lead, Observation, PartResult, Setpoints, SignalState, VehicleState
 from chauffeur.concept.sight import seen_from
 from chauffeur.concept.utterance import Reference
 from chauffeur.geometry import Pose, RoadGraph, named_ways, wrap_to_pi
 from chauffeur.geometry.road_graph import turn_of
 
-ActResult = Literal["done", "not_done", "opposite", "not_judged"]
 Referents = Mapping[Reference, tuple[int, ...]]
 """Ids of the road users that references mean, where a stage names them."""
 
@@ -39,7 +38,7 @@ class Found(NamedTuple):
     `planned` tells that a number of the plan's decided, where the words have none.
     """
 
-    result: ActResult
+    result: PartResult
     end: int
     why: str = ""
     planned: bool = False

@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from chauffeur.concept import AgentKind, LaneId, Mark, SignalState, mark_of
+from chauffeur.concept import AgentKind, LaneId, Mark, Sign, SignalState, mark_of
 from chauffeur.driving.live.messages import MessageError
 from chauffeur.geometry.road_graph import LaneKind
 
@@ -62,20 +62,22 @@ class RoadLane:
     centre_m: tuple[tuple[float, float], ...]
     what: LaneKind = "driving"
     junction: str = ""
+    street: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Road:
-    """The road of the trip; told once, and again when another trip begins."""
+    """The road of the trip, with its signs; told once, and again when another trip begins."""
 
     world: str
     lanes: tuple[RoadLane, ...]
+    signs: tuple[Sign, ...] = ()
     kind: Literal["road"] = "road"
 
 
 @dataclass(frozen=True, slots=True)
 class ShownBody:
-    """A vehicle or thing from above: centre, heading (rad), size, speed."""
+    """A vehicle or thing from above: centre, heading (rad), size, speed, and its colour as `#rrggbb`, if known."""
 
     id: int
     what: AgentKind
@@ -85,6 +87,7 @@ class ShownBody:
     length_m: float
     width_m: float
     speed_mps: float
+    paint: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +100,15 @@ class ShownLight:
 
 @dataclass(frozen=True, slots=True)
 class ShownGoal:
-    """Where the car is going: its name, empty for none; where one stops; how far it is by road, m."""
+    """Where the car is going: its name, empty for none; where one stops; how far it is by road (m), how long that takes
+    at the limits of the way (s), and the lanes of the way."""
 
     name: str
     x_m: float
     y_m: float
     left_m: float
+    left_s: float = 0.0
+    lanes: tuple[LaneId, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from typing import Final
 
-from chauffeur.concept import DataError, Observation, Sign, VehicleState
+from chauffeur.concept import DataError, LaneId, Observation, VehicleState
+from chauffeur.concept.paint import css_colour
+from chauffeur.concept.scene import stop_sign_of
 from chauffeur.driving.live.messages import MessageError, MirroredInstant, Report
 from chauffeur.driving.live.mirror import mirror_of
 from chauffeur.driving.live.ring import Reader, Ring
@@ -17,7 +18,9 @@ from chauffeur.worlds.places import TownPlaces
 
 _INSTANTS: Final = 100
 """Instants that are kept, 5 to 10 s of them: plans are judged a moment after they were seen."""
-_SIGHT_M: Final = 100.0
+_LEAST_MPS: Final = 1.0
+_TOWN_SHARE: Final = 2.0
+"""Lights, turns and traffic double the time that the limits would allow."""
 
 
 class View:
@@ -92,7 +95,7 @@ class View:
             taken_over=seen.handovers % 2 == 1,
             ego=_body(observation.ego),
             others=tuple(
-                _body(each) for each in (*observation.others, *observation.objects, *_stop_signs(observation))
+                _body(each) for each in (*observation.others, *observation.objects) if each.kind != "stop_sign"
             ),
             acceleration_mps2=0.0 if told is None else told.applied.acceleration_mps2,
             steering_rad=0.0 if told is None else told.applied.steering_rad,
@@ -108,12 +111,15 @@ class View:
             missed=0 if told is None else told.missed,
             lights=tuple(ShownLight(light.state, light.stop_line_m) for light in observation.signals),
             street=_street(observation),
-            goal=self._goal(),
+            goal=self._goal(observation),
         )
 
-    def _goal(self) -> ShownGoal | None:
+    def _goal(self, observation: Observation) -> ShownGoal | None:
         there = self._world.destination() if isinstance(self._world, TownPlaces) else None
-        return None if there is None else ShownGoal(there.name, there.x_m, there.y_m, round(there.left_m, 1))
+        if there is None:
+            return None
+        left_s = round(_left_s(observation, there.left_m), 1)
+        return ShownGoal(there.name, there.x_m, there.y_m, round(there.left_m, 1), left_s, _ahead(observation))
 
 
 def _body(state: VehicleState) -> ShownBody:
@@ -126,6 +132,7 @@ def _body(state: VehicleState) -> ShownBody:
         state.length_m,
         state.width_m,
         state.speed_mps,
+        None if state.colour is None else css_colour(state.colour),
     )
 
 
@@ -138,29 +145,36 @@ def _street(observation: Observation) -> str:
     return "" if onward is None else onward.street
 
 
-def _stop_signs(observation: Observation) -> tuple[VehicleState, ...]:
-    """Stop signs near that the road has, and not its instants."""
-    ego = observation.ego
-    return tuple(
-        VehicleState(number, "stop_sign", *_stop_line(sign), 0.0, 0.0, 1.0, 1.0, sign.lanes[0] if sign.lanes else None)
-        for number, sign in enumerate(observation.signs)
-        if sign.kind == "stop" and math.hypot(sign.x_m - ego.x_m, sign.y_m - ego.y_m) < _SIGHT_M
-    )
-
-
-def _stop_line(sign: Sign) -> tuple[float, float]:
-    """Where one stops for it."""
-    if sign.stop_line_m is None:
-        return sign.x_m, sign.y_m
-    (ax, ay), (bx, by) = sign.stop_line_m
-    return (ax + bx) / 2.0, (ay + by) / 2.0
-
-
 def _road(observation: Observation) -> Road:
-    lanes = (
+    lanes = tuple(
         RoadLane(
-            lane.id, lane.width_m, lane.road, lane.index, lane.emergency, lane.centre.points_m, lane.kind, lane.junction
+            lane.id,
+            lane.width_m,
+            lane.road,
+            lane.index,
+            lane.emergency,
+            lane.centre.points_m,
+            lane.kind,
+            lane.junction,
+            lane.street,
         )
         for lane in observation.road.lanes
     )
-    return Road(observation.kind, tuple(lanes))
+    signs = (stop_sign_of(one) for one in observation.objects if one.kind == "stop_sign")
+    return Road(observation.kind, lanes, (*observation.signs, *signs))
+
+
+def _left_s(observation: Observation, left_m: float) -> float:
+    """How long a way takes at the limits of its lanes from here on, s; lights and traffic add to it."""
+    route, road = observation.route, observation.road
+    lanes = () if route is None else tuple(road[lane] for lane in _ahead(observation))
+    length_m = sum(lane.length_m for lane in lanes)
+    free_s = sum(lane.length_m / max(lane.speed_limit_mps, _LEAST_MPS) for lane in lanes)
+    return left_m * free_s / length_m * _TOWN_SHARE if length_m else 0.0
+
+
+def _ahead(observation: Observation) -> tuple[LaneId, ...]:
+    """The lanes of the way from the ego's on; all of them where it is on none."""
+    lanes = () if observation.route is None else observation.route.lanes
+    here = observation.ego.lane
+    return lanes[lanes.index(here) :] if here in lanes else lanes

@@ -21,31 +21,18 @@ function pair(list, term, value, small) {
 /* Speeds in the person's unit, whole; what must not be exceeded is rounded down, but for what storing it has cost. */
 const pace = (mps) => (mps * trip.pace.of).toFixed(0);
 const atMost = (mps) => Math.floor(mps * trip.pace.of + 0.05).toFixed(0);
-
-function fillUnderstood() {
-  const row = (term, value) => {
-    if (!value) return;
-    const box = make('div');
-    box.append(make('dt', term), make('dd', value));
-    $('understood').append(box);
-  };
-  row({ 'asked back': 'Asked', done: 'Answer' }[trip.outcome.result] || 'Declined', trip.refusal);
-  if (trip.outcome.end) row('At the end', trip.outcome.end);
-  row('Going to', trip.going_to);
-  row('Road', trip.title);
-  row('Said by', trip.person);
-}
+const seconds = (time) => `${time.toFixed(1)} s`;
 
 function fillProgram() {
   const box = $('program');
   if (!trip.program) {
     if (trip.policy) $('policy-kind').textContent = 'Policy';
-    box.append(trip.policy ? make('pre', trip.policy) : make('p', trip.refusal || 'There is no program.'));
+    box.append(trip.policy ? make('pre', trip.policy) : make('p', 'There is no program.'));
     return [];
   }
   const list = make('ol');
   const flagged = new Map(trip.verdicts.filter((v) => !v.passed && v.vetoes && v.line).map((v) => [v.line, v.reason]));
-  const doubted = new Map(trip.mismatches.filter((m) => m.line).map((m) => [m.line, mismatchWords(m)]));
+  const doubted = new Map(trip.mismatches.filter((m) => m.line).map((m) => [m.line, `${m.kind}: ${m.instead}`]));
   trip.program.forEach((tokens, index) => {
     const line = make('li');
     line.dataset.n = index + 1;
@@ -69,45 +56,53 @@ function fillProgram() {
   return [...list.children];
 }
 
-/* What a mark looks like and is called; which one a verdict gets was decided where it was judged. */
-const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'], not_compared: ['uncompared', 'not compared'] };
+/* How a mark is called; which one a verdict gets was decided where it was judged. */
+const MARKS = { passed: 'passed', open: 'not all proven', differs: 'does not fit', failed: 'not passed', not_compared: 'not compared' };
 
-function fillVerdicts() {
-  if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
+function markOf(mark, sign) {
+  const icon = make('b', sign, mark);
+  icon.setAttribute('aria-label', MARKS[mark]);
+  icon.setAttribute('role', 'img');
+  return icon;
+}
+
+/* For the person by name, with a reason where something is not as it should be; below, for engineers, all by id. */
+function fillChecks() {
+  const line = (mark, sign, ...texts) => {
+    const item = make('li');
+    item.append(markOf(mark, sign), ...texts.filter(Boolean).map((text) => make('span', text)));
+    return item;
+  };
+  const grey = trip.verdicts.filter((v) => v.mark === 'not_compared');
+  $('checked').hidden = grey.length === trip.verdicts.length;
   for (const verdict of trip.verdicts) {
-    const [look, said] = MARKS[verdict.mark];
-    const item = make('li', null, look);
-    const icon = make('b', verdict.sign);
-    icon.setAttribute('aria-label', said);
-    icon.setAttribute('role', 'img');
-    const where = verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check;
-    item.append(icon, make('span', verdict.reason || (verdict.passed ? 'Passed.' : 'Not passed.')));
-    if (verdict.remedy && !verdict.passed && verdict.vetoes) item.append(make('span', verdict.remedy));
-    if (verdict.mark === 'differs') item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
-    item.append(make('small', where));
-    $('verdicts').append(item);
+    const { mark, sign, name } = verdict;
+    const remedy = !verdict.passed && verdict.vetoes ? verdict.remedy : '';
+    if (mark === 'passed' || mark === 'open') $('checks').append(line(mark, sign, mark === 'open' ? `${name}, not all proven` : name));
+    else if (mark !== 'not_compared') $('checks').append(line(mark, sign, verdict.reason, remedy));
+    const all = line(mark, sign, verdict.reason || MARKS[mark], remedy);
+    all.append(make('small', verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check));
+    $('verdicts').append(all);
   }
+  if (grey.length) $('checks').append(line('not_compared', grey[0].sign, `not compared: ${grey.map((v) => v.name).join(', ')}`));
+  if (trip.shield) $('checks').append(line('shielded', 'S', trip.shield.summary));
 }
 
 function fillResults() {
-  $('outcome').classList.add(trip.outcome.tone);
-  for (const cause of trip.outcome.causes) if (cause !== trip.refusal) $('causes').append(make('li', cause));
-  $('judged').textContent = trip.outcome.judged || 'Nothing was driven that could be judged.';
+  for (const cause of [...trip.outcome.causes, trip.outcome.end].filter(Boolean)) $('causes').append(make('li', cause));
+  $('causes').append(make('li', [trip.title, trip.person && `said by ${trip.person}`].filter(Boolean).join('; '), 'muted'));
+  $('judged').textContent = trip.outcome.judged || 'Nothing was held against the words.';
   const scores = $('scores');
-  pair(scores, 'Result', trip.outcome.label);
-  pair(scores, 'Time driven', `${trip.duration.toFixed(1)} s`);
-  pair(scores, 'Understood as', trip.intent || 'not told');
+  pair(scores, 'Time driven', seconds(trip.duration));
+  pair(scores, 'Intent', trip.intent || 'not told');
   for (const [name, value] of trip.settings) pair(scores, name, value);
   for (const metric of trip.metrics) {
     const dd = pair(scores, metric.name, metric.value, metric.id);
     if (!metric.applies) dd.className = 'na';
   }
-  fillThoughts();
   $('context').textContent = trip.context || 'No context was recorded.';
   for (const [name, value] of trip.provenance) pair($('provenance'), name, value);
 }
-
-const mismatchWords = (m) => `${m.kind}: ${m.instead}${m.line ? ` (line ${m.line})` : ''}`;
 
 /* The thoughts with every sentence marked that is not so, and below them what is so instead. */
 function fillThoughts() {
@@ -119,7 +114,8 @@ function fillThoughts() {
     $('view').prepend(image);
     $('view').hidden = false;
   }
-  const text = trip.thoughts || 'The planner gave no reasoning.';
+  $('why').hidden = !trip.thoughts && !trip.view;
+  const text = trip.thoughts;
   const wrong = new Map();
   for (const m of trip.mismatches) {
     const from = m.said ? text.indexOf(m.said) : -1;
@@ -143,38 +139,38 @@ function fillThoughts() {
   $('doubts').hidden = !trip.mismatches.length;
 }
 
-/* What the run-time shield changed; each stretch leads to its instant. */
-function fillShield(seek) {
+/* What happened when, and what the shield changed; each leads to its instant. */
+function fillSteps(seek) {
+  const step = (time, ...texts) => {
+    const item = make('li');
+    const at = make('button', seconds(time));
+    at.type = 'button';
+    at.setAttribute('aria-label', `Show ${seconds(time)}: ${texts[0]}`);
+    at.addEventListener('click', () => seek(time));
+    const what = make('span', texts[0]);
+    if (texts[1]) what.append(make('small', texts[1]));
+    item.append(at, what);
+    return item;
+  };
+  $('happened').hidden = false;
+  const told = trip.events.filter((event) => event.kind !== 'shield');
+  $('steps').append(...told.map((event) => step(event.t, event.kind === 'said' ? `“${event.label}”` : event.label)));
+  $('steps').append(step(trip.duration, 'The drive ends.'));
   if (!trip.shield) return;
   $('shield').hidden = false;
-  $('shield-summary').textContent = trip.shield.summary;
-  for (const rule of trip.shield.rules) {
-    const many = (count, one, more) => (count === 1 ? `1 ${one}` : `${count} ${more}`);
-    const commands = many(rule.changes, 'command', 'commands');
-    pair($('shield-rules'), rule.name, `${commands} in ${many(rule.stretches, 'stretch', 'stretches')}`);
-  }
-  for (const stretch of trip.shield.stretches) {
-    const item = make('li');
-    const at = make('button', `${stretch.t.toFixed(1)} s`);
-    at.type = 'button';
-    at.setAttribute('aria-label', `Show ${stretch.t.toFixed(1)} seconds: ${stretch.name}`);
-    at.addEventListener('click', () => seek(stretch.t));
-    const what = make('span');
-    what.append(make('b', stretch.name), ` ${stretch.change} `, make('small', `for ${(stretch.end - stretch.t).toFixed(1)} s. ${stretch.reason}`));
-    item.append(at, what);
-    $('stretches').append(item);
-  }
+  const many = (count, word) => `${count} ${word}${count === 1 ? '' : word.endsWith('ch') ? 'es' : 's'}`;
+  for (const rule of trip.shield.rules) pair($('shield-rules'), rule.name, `${many(rule.changes, 'command')} in ${many(rule.stretches, 'stretch')}`);
+  for (const one of trip.shield.stretches) $('stretches').append(step(one.t, `${one.name}: ${one.change}`, `for ${seconds(one.end - one.t)}. ${one.reason}`));
 }
 
 const shieldAt = (time) => (trip.shield ? trip.shield.stretches.filter((s) => s.t <= time + 1e-6 && time < s.end - 1e-6) : []);
 
 function fillHistory() {
-  if (!trip.history.length) $('history').append(make('li', 'Nothing was recalled for this wish.', 'none'));
+  $('memory').hidden = !trip.history.length;
   for (const item of trip.history) {
     const li = make('li');
-    const about = [item.when.slice(0, 10), item.intent, item.outcome, `${Math.round(item.similarity * 100)} % alike`];
+    const about = [item.when.slice(0, 10), item.outcome, ...item.settings.map(([n, v]) => `${n} ${v}`)];
     li.append(make('q', item.instruction), make('small', about.filter(Boolean).join(' · ')));
-    if (item.settings.length) li.append(make('small', item.settings.map(([n, v]) => `${n} ${v}`).join(' · ')));
     for (const said of item.feedback) {
       const quote = make('blockquote', said.text);
       quote.append(make('small', said.meaning));
@@ -184,42 +180,45 @@ function fillHistory() {
   }
 }
 
-/* The four instruments under the road; returns a function that sets them for an instant. */
+/* The instruments under the road; returns a function that sets them for an instant and says them in a sentence. */
 function makeInstruments() {
-  const cells = ['Speed', 'Target', 'Gap ahead', 'Place'].map((name) => {
+  const cells = Object.fromEntries(['Speed', 'Gap ahead', drive.to_go ? 'To go' : 'Lane', 'Doing'].map((name) => {
     const box = make('div');
     const value = make('dd');
     const sub = make('dd', null, 'sub');
     box.append(make('dt', name), value, sub);
     $('instruments').append(box);
-    return { value, sub };
-  });
-  const [speed, target, gap, place] = cells;
-  speed.value.className = 'ego';
-  place.value.className = 'words';
-  const put = (cell, number) => {
-    cell.value.textContent = number;
-    cell.value.append(make('small', trip.pace.unit));
+    return [name, [value, sub]];
+  }));
+  cells.Speed[0].className = 'ego';
+  const set = (name, value, sub) => {
+    const [above, below] = cells[name];
+    above.textContent = value;
+    below.textContent = sub;
+    return [name.toLowerCase(), value, sub].filter(Boolean).join(' ');
   };
-  return (index, mps) => {
-    put(speed, pace(mps));
+  const clock = (time) => `${Math.floor(time / 60)}:${String(Math.floor(time % 60)).padStart(2, '0')} min`;
+  return (index) => {
+    const mps = drive.speed[index];
+    const { unit } = trip.pace;
+    const [wanted, limit, distance, stop] = [drive.target[index], drive.limit[index], drive.gap[index], drive.stop[index]];
+    const bounds = [wanted !== null && `set to ${atMost(wanted)}`, limit !== null && `limit ${atMost(limit)}`];
+    const behind = distance !== null && mps > 1 ? `${(distance / mps).toFixed(1)} s` : '';
+    const told = [
+      set('Speed', `${pace(mps)} ${unit}`, bounds.filter(Boolean).join(' · ')),
+      set('Gap ahead', distance === null ? 'free' : `${distance.toFixed(0)} m`, stop === null ? behind : `stop sign in ${stop.toFixed(0)} m`),
+    ];
+    if (drive.to_go) {
+      const left = Math.max(trip.duration - drive.time[index], 0);
+      told.push(set('To go', `${drive.to_go[index].toFixed(0)} m`, [trip.going_to, drive.arrives && clock(left)].filter(Boolean).join(' · ')));
+    } else {
+      told.push(set('Lane', drive.lane[index].replace(/^lane /, '') || 'intersection', /of [2-9]/.test(drive.lane[index]) ? 'from the left' : ''));
+    }
     const a = drive.acceleration[index];
-    const signed = (value) => `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value).toFixed(1)}`;
-    const asked = drive.asked[index];
-    const held = shieldAt(drive.time[index]).length && Math.abs(asked - a) >= 0.05;
-    speed.sub.textContent = held ? `${signed(a)} m/s², asked ${signed(asked)}` : `${signed(a)} m/s²`;
-    const wanted = drive.target[index];
-    if (wanted === null) target.value.textContent = 'as it is';
-    else put(target, atMost(wanted));
-    const limit = drive.limit[index];
-    target.sub.textContent = limit === null ? '' : `limit ${atMost(limit)} ${trip.pace.unit}`;
-    const distance = drive.gap[index];
-    gap.value.textContent = distance === null ? 'none' : `${distance.toFixed(1)} m`;
-    if (distance !== null && mps > 1) gap.value.append(make('small', `${(distance / mps).toFixed(1)} s`));
-    const stop = drive.stop[index];
-    gap.sub.textContent = stop !== null ? `stop sign in ${stop.toFixed(0)} m` : distance === null ? '' : 'centre to centre';
     const turn = drive.turn[index];
-    place.value.textContent = drive.lane[index] || (turn ? `turning ${turn}`.replace('turning straight', 'going straight') : 'intersection');
-    place.sub.textContent = drive.lane[index].startsWith('lane') ? 'counted from the left' : '';
+    const pedals = mps < 0.3 ? 'standing' : a > 0.3 ? 'speeding up' : a < -0.3 ? 'braking' : 'steady';
+    const why = shieldAt(drive.time[index]).map((s) => `shield: ${s.name}`)[0];
+    told.push(set('Doing', pedals, why || (turn ? `turning ${turn}`.replace('turning straight', 'going straight') : '')));
+    return told.join('; ');
   };
 }

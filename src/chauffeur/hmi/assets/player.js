@@ -1,5 +1,5 @@
 /* Time: playing, scrubbing, marks, and bringing every part to the same instant. */
-const GLYPHS = { said: '“', lane_change: '⇄', stopped: '■', finished: '✓', failed: '✕', collision: '✸', off_road: '⚠', shield: 'S' };
+const GLYPHS = { said: '“', lane_change: '⇄', stopped: '■', drove_on: '▸', finished: '●', failed: '✕', collision: '✸', off_road: '⚠', shield: 'S' };
 const RATES = [0.5, 1, 2, 4, 8];
 const STATES = { none: '', running: 'running', finished: 'finished', failed: 'failed' };
 const CAPTION_S = 3;
@@ -21,12 +21,13 @@ function makePlayer() {
 
   scrub.max = total;
   scrub.step = period.toFixed(3);
-  $('total').textContent = `of ${total.toFixed(1)} s`;
+  $('total').textContent = `of ${seconds(total)}`;
 
   function showInstant(index) {
     if (index === shown) return;
     shown = index;
-    setInstruments(index, drive.speed[index]);
+    const told = setInstruments(index);
+    if (!playing) $('now').textContent = `${seconds(drive.time[index])}: ${told}`;
     const state = drive.state[index];
     $('program-state').textContent = STATES[state];
     $('program-state').className = `pill ${state}`;
@@ -62,9 +63,9 @@ function makePlayer() {
     showInstant(index);
     for (const chart of charts) chart.move(time, index);
     scrub.value = time;
-    scrub.setAttribute('aria-valuetext', `${time.toFixed(1)} seconds`);
+    scrub.setAttribute('aria-valuetext', seconds(time));
     scrub.style.setProperty('--done', `${(time / total) * 100}%`);
-    $('clock').textContent = `${time.toFixed(1)} s`;
+    $('clock').textContent = seconds(time);
   }
 
   function seek(to) {
@@ -130,7 +131,7 @@ function makePlayer() {
       const mark = make('button', GLYPHS[event.kind], `mark ${event.kind}${row ? ' high' : ''}`);
       mark.type = 'button';
       mark.style.left = `${x}px`;
-      mark.title = `${event.t.toFixed(1)} s: ${event.label}`;
+      mark.title = `${seconds(event.t)}: ${event.label}`;
       mark.setAttribute('aria-label', mark.title);
       mark.addEventListener('click', () => { pause(); seek(event.t); });
       placed.push([event.t, mark]);
@@ -159,7 +160,7 @@ function makePlayer() {
   scrub.addEventListener('input', () => { pause(); seek(Number(scrub.value)); });
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const typed = event.target.closest('button, input[type=radio], .code');
+    const typed = event.target.closest('button, input[type=radio], .code, summary');
     const jump = event.shiftKey ? 1 : period;
     const faster = RATES.indexOf(rate);
     const actions = {
@@ -178,7 +179,7 @@ function makePlayer() {
     action();
   });
 
-  fillShield((at) => { pause(); seek(at); });
+  fillSteps((at) => { pause(); seek(at); });
   new ResizeObserver(resize).observe(document.querySelector('.frame'));
   window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', resize);
   resize();
@@ -188,18 +189,13 @@ function makePlayer() {
   else if (!calm.matches) play();
 }
 
-fillUnderstood();
-fillVerdicts();
+fillChecks();
+fillThoughts();
 fillResults();
 fillHistory();
 if (drive) {
   makePlayer();
 } else {
   fillProgram();
-  $('transport').hidden = true;
-  $('road').hidden = true;
-  $('calls').hidden = true;
-  $('calls-title').hidden = true;
-  $('empty').hidden = false;
-  $('empty').textContent = `Nothing was driven. ${trip.refusal || trip.outcome.causes.join(' ')}`;
+  for (const id of ['player', 'calls', 'calls-title']) $(id).hidden = true;
 }

@@ -5,43 +5,55 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncGenerator, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from chauffeur.concept import Lane, RoadGraph
+from chauffeur.concept.units import SpeedUnit
 from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
-from chauffeur.hmi.road import Bounds, draw_road
+from chauffeur.hmi.road import Bounds, as_json, draw_road, flat
+from chauffeur.hmi.view import as_picture
+from chauffeur.hmi.words import pace_of, passenger_units
 
 _MARGIN_M = 20.0
 _ON_FOOT = ("sidewalk", "crossing")
 
 
+def in_unit(told: Conversation, unit: SpeedUnit) -> Conversation:
+    """A conversation with the speeds that the car speaks of in the person's unit, whole."""
+    why, thoughts = (passenger_units(text, unit) for text in (told.why, told.thoughts))
+    return replace(told, why=why, thoughts=thoughts, said=tuple(passenger_units(text, unit) for text in told.said))
+
+
 def drawn(road: Road) -> dict[str, Any]:
-    """As a JSON object: the lanes as they were told, and what is painted on them."""
-    lanes = tuple(
+    """As a JSON object: the lanes as they were told, and the road as the pages' drawer takes it."""
+    told = tuple(
         Lane(
             lane.id,
-            Polyline.of((x, -y) for x, y in lane.centre_m),
+            Polyline.of(lane.centre_m),
             lane.width_m,
             0.0,
             kind="emergency" if lane.shoulder else lane.what,
             road=lane.road,
             index=lane.index,
             junction=lane.junction,
+            street=lane.street,
         )
         for lane in road.lanes
     )
+    graph, signs = as_picture(RoadGraph(told), road.signs)
+    lanes = graph.lanes
     xs = [x for lane in lanes for x, _ in lane.centre.points_m]
     ys = [y for lane in lanes for _, y in lane.centre.points_m]
     everything = Bounds(min(xs, default=0.0), min(ys, default=0.0), max(xs, default=0.0), max(ys, default=0.0))
-    painted = draw_road(RoadGraph(lanes), (), everything.grown(_MARGIN_M))
     return {
         "kind": road.kind,
         "world": road.world,
         "lanes": [
             {
                 "id": lane.id,
-                "p": _flat(lane.centre.points_m),
+                "p": flat(lane.centre.points_m),
                 "w": lane.width_m,
                 "road": lane.road,
                 "i": lane.index,
@@ -50,14 +62,7 @@ def drawn(road: Road) -> dict[str, Any]:
             for lane in lanes
             if lane.kind not in _ON_FOOT
         ],
-        "surfaces": [{"p": _flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in painted.surfaces],
-        "lines": [{"p": _flat(line.points_m), "s": line.style} for line in painted.lines],
-        "bars": [_flat(bar) for bar in painted.bars_m],
-    }
-
-
-def _flat(points: tuple[tuple[float, float], ...]) -> list[float]:
-    return [round(value, 2) for point in points for value in point]
+    } | as_json(draw_road(graph, (), everything.grown(_MARGIN_M), signs))
 
 
 MOST_WAITING: Final = 500
@@ -114,6 +119,7 @@ class LatestMessages:
     def __init__(self) -> None:
         self._kept: dict[str, str] = {}
         self._conversations: dict[str, str] = {}
+        self._unit: SpeedUnit = "km/h"
 
     def write(self, said: Said) -> tuple[str, str]:
         """Keep what will still hold when another screen joins.
@@ -121,7 +127,16 @@ class LatestMessages:
         Returns:
             The message as JSON, and its key for `Outbox.put`; empty where each one counts.
         """
-        text = json.dumps(drawn(said)) if isinstance(said, Road) else encode(said).decode()
+        match said:
+            case Road():
+                text = json.dumps(drawn(said))
+            case Conversation():
+                self._unit = pace_of(said.text, self._unit)
+                text = json.dumps(json.loads(encode(in_unit(said, self._unit))) | {"unit": self._unit})
+            case Note():
+                text = encode(replace(said, text=passenger_units(said.text, self._unit))).decode()
+            case _:
+                text = encode(said).decode()
         match said:
             case Conversation(wish=wish):
                 key = f"conversation {wish}"

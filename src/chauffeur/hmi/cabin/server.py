@@ -27,9 +27,12 @@ _MODULES: Final = (
     *("cabin", "conversation", "elements", "hands", "link", "memory", "microphone"),
     *("recorder", "resample", "scene", "words"),
 )
+_SHARED: Final = "chauffeur.hmi"
 _FILES: Final = {
     "": PageFile(_PACKAGE, "cabin.html", "text/html"),
     "cabin.css": PageFile(_PACKAGE, "cabin.css", "text/css"),
+    "scene.css": PageFile(_SHARED, "scene.css", "text/css"),
+    "drawer.js": PageFile(_SHARED, "drawer.js", "text/javascript"),
     **{f"{name}.js": PageFile(_PACKAGE, f"{name}.js", "text/javascript") for name in _MODULES},
 }
 

@@ -52,7 +52,7 @@ def act_words(act: Act) -> str:
         parts.append(f"at the next {where.removeprefix('the ')}" if rel == "next" else f"{rel} {where}")
     if act.manner is not None:
         parts.append(_MANNERS[act.manner])
-    if act.style is not None and act.act != "go":
+    if act.style is not None and _STYLES[act.style] not in parts[1]:
         parts.append(_WHY_SO.get(act.style, _STYLES[act.style]))
     if act.when is not None:
         parts.append(f"— {condition_words(act.when)}")
@@ -112,6 +112,8 @@ def _speed(act: Act, amount: str, degree: str) -> str:
             return _AIMS[act.aim]
         case _ if act.direction == "same" and act.target is not None:
             return "drive as fast as"
+        case _ if act.style is not None and not change:
+            return f"drive {_STYLES[act.style]}"
         case _:
             return f"{change} {degree}".strip() or "drive at another speed"
 

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chauffeur.bench.lampilot.goals import make_goal
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee
 from chauffeur.concept import Observation, Outcome, Scenario
 from chauffeur.concept.nouns import Metric
 from chauffeur.driving.episode import drive_program
+from chauffeur.driving.judge.goals import make_goal
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.link import Linked
 from chauffeur.programs import Sandbox

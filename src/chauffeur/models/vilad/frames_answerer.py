@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
-from chauffeur.bench.openloop.requests import read_context, waypoints_text
 from chauffeur.concept import ConfigError, PlannerError, Usage
 from chauffeur.models.vilad.frames_data import fitted
 from chauffeur.planners.base import Prose
 from chauffeur.planners.picture_parts import parts_of
+from chauffeur.planners.prompts.waypoints import read_motion, waypoints_text
 
 if TYPE_CHECKING:
     from chauffeur.models.vilad.frames_store import FramesMethod
@@ -69,7 +69,7 @@ class FramesAnswerer:
         if not pictures and self._method != "status":
             raise PlannerError("The conversation's last turn has no picture.", hint="Ask with setting sft.")
         try:
-            history, command = read_context(text)
+            history, command = read_motion(text)
         except ValueError as error:
             raise PlannerError(f"The question tells no motion that can be read: {error}.") from error
         image = pictures[-1].image if pictures else None

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from chauffeur.bench.openloop.extrapolation import constant_velocity
-from chauffeur.bench.openloop.nuscenes import FUTURE
+from chauffeur.foreign.waypoints import FUTURE
 from chauffeur.models.vilad.frames_data import FrameSet
 from chauffeur.models.vilad.frames_vision import StatusHead, batches, l2, status
 from chauffeur.models.vilad.waypoints import displacements

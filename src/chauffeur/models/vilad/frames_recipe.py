@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from chauffeur.bench.openloop.nuscenes import FUTURE
+from chauffeur.foreign.waypoints import FUTURE
 from chauffeur.models.net.transformer import TransformerConfig
 from chauffeur.models.train.rates import cosine_rate
 from chauffeur.models.train.trainer import Optimisation, fit

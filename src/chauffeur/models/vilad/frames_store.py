@@ -28,13 +28,12 @@ from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_pa
 from chauffeur.models.vilad.frames_vision import SAID, SEEN_WIDTH, SeeingHead, StatusHead, regressed, tokens_of
 from chauffeur.models.vilad.network import Vilad
 from chauffeur.models.vilad.waypoints import WaypointCodebook
-from chauffeur.planners.vilad.engine import SHIPPED
 from chauffeur.planners.vilad.unmasking import Unmasking
 
 Array = np.ndarray[Any, Any]
 FramesMethod = Literal["vilad", "twin", "regression", "status"]
 METHODS: Final = get_args(FramesMethod)
-OWN: Final = SHIPPED / "frames"
+OWN: Final = Path(__file__).parent / "weights" / "frames"
 """The model that ships."""
 VERSION: Final = "vilad-frames-v2"
 """Of what is stored: codes of the first were displacements from constant velocity."""

@@ -18,7 +18,7 @@ import torch
 from torch import nn
 
 from chauffeur.bench.openloop.driving import COMMANDS
-from chauffeur.bench.openloop.nuscenes import FUTURE
+from chauffeur.foreign.waypoints import FUTURE
 from chauffeur.models.net.vision import VisionConfig, VisionEncoder, vision
 from chauffeur.models.train.trainer import Optimisation, fit
 from chauffeur.models.vilad.frames_data import EGO_WIDTH, FrameSet

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chauffeur.bench.openloop.extrapolation import constant_velocity
-from chauffeur.bench.openloop.nuscenes import FUTURE
+from chauffeur.foreign.waypoints import FUTURE
 from chauffeur.planners.vilad.template import ActionSlot, ActionTemplate
 
 if TYPE_CHECKING:

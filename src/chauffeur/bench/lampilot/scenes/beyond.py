@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.goals import SIGHT_M
 from chauffeur.bench.lampilot.scenes.sampling import whole
 from chauffeur.bench.lampilot.scenes.wish_sampler import (
     CAR_M,
@@ -26,6 +25,7 @@ from chauffeur.bench.lampilot.scenes.wish_sampler import (
 )
 from chauffeur.bench.lampilot.scenes.wishes import Named, Right, SceneWish
 from chauffeur.concept import Observation
+from chauffeur.driving.judge.goals import SIGHT_M
 
 Generator = np.random.Generator
 

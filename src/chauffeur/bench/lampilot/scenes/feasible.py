@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, make_goal
-from chauffeur.bench.lampilot.referee import GoalJudge
 from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
 from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
 from chauffeur.driving.episode import drive_program, drive_without_program
+from chauffeur.driving.judge.goals import GIVE_UP_S, Goal, make_goal
+from chauffeur.driving.judge.lampilot import GoalJudge
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.network import lane_id
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.goals import SIGHT_M
 from chauffeur.bench.lampilot.scenes.sampling import whole
 from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, SceneWish
 from chauffeur.concept import Lead, Observation
+from chauffeur.driving.judge.goals import SIGHT_M
 
 Generator = np.random.Generator
 

@@ -7,11 +7,17 @@ import { openLink } from './link.js';
 import { makeMemory } from './memory.js';
 import { makeMicrophone } from './microphone.js';
 import { makeScene } from './scene.js';
-import { NOT_HEARD, kmh, levelWords } from './words.js';
+import { NOT_HEARD, atMost, levelWords, speakIn, unitNow, whole } from './words.js';
 
 const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
 const hint = () => (speaks() ? 'Hold the button and say what you want, or type it.' : ['Type what you want.', whyMute()].filter(Boolean).join(' '));
+
+/* What one may do, while there is nothing to tell. */
+function showHint(words = hint()) {
+  $('heard').className = 'heard idle';
+  write($('heard-words'), words);
+}
 
 const road = makeScene($('road'));
 const conversation = makeConversation();
@@ -43,7 +49,7 @@ const does = {
   seat_view(told) { showSeat(told); },
   listening(told) { listening = told; showHeard(); },
   heard(told) { showHeardWords(told); },
-  conversation(told) { conversation.told(told); },
+  conversation(told) { speakIn(told.unit); conversation.told(told); },
   how_was_it(told) { conversation.askFor(told); },
   memory(told) { memory.told(told); },
   note(told) { conversation.note(told); },
@@ -151,7 +157,7 @@ function showSession() {
     ['Listens with', engine], ['Person', session.person || 'nobody’s memory is used'], ['Control periods', `${Math.round(1 / session.dt_s)} a second`], ['Missed periods', '–'],
   ];
   $('session').replaceChildren(...pairs.flatMap(([name, value]) => [make('dt', { text: name }), make('dd', { text: String(value), id: name === 'Missed periods' ? 'missed' : null })]));
-  if (!talking && !question) write($('heard-words'), hint());
+  if (!talking && !question) showHint();
   if (!session.person) memory.told({ person: '', private: false, retention_days: null, count: 0, newest: [] });
   showMicrophone(false);
 }
@@ -160,12 +166,12 @@ function showScene() {
   road.show(scene);
   conversation.follow(scene);
   const speed = Math.abs(scene.ego.speed_mps);
-  write($('speed'), String(kmh(speed)));
-  write($('speed-mps'), `${speed.toFixed(1)} m/s`);
-  write($('limit'), scene.limit_mps > 0 ? String(kmh(scene.limit_mps)) : '–');
+  write($('speed'), String(whole(speed)));
+  write($('limit'), scene.limit_mps > 0 ? String(atMost(scene.limit_mps)) : '–');
   const target = scene.target_mps;
-  write($('target'), target === null ? 'none' : String(kmh(target)));
-  write($('target-unit'), target === null ? '' : 'km/h');
+  write($('target'), target === null ? 'none' : String(whole(target)));
+  for (const unit of document.querySelectorAll('.unit')) write(unit, unitNow());
+  $('target-unit').hidden = target === null;
   const off = target === null ? 0 : target - speed;
   $('target-way').hidden = Math.abs(off) < 0.5;
   write($('target-sign'), off > 0 ? '▲' : '▼');
@@ -204,8 +210,9 @@ function endQuestion() {
 
 function answer(yes) {
   if (!question || !say('confirm', { yes })) return;
-  write($('heard-words'), yes ? `“${question.text}”` : 'Then say it again, or type it.');
   endQuestion();
+  if (yes) showHint();
+  else write($('heard-words'), 'Then say it again, or type it.');
 }
 
 function showHeard() {
@@ -214,10 +221,9 @@ function showHeard() {
     $('heard').className = 'heard busy';
     write($('heard-words'), words);
   } else if (!talking && $('heard').className === 'heard busy') {
-    $('heard').className = 'heard';
-    write($('heard-words'), hint());
+    showHint();
   }
-  if (!question && !talking && (listening.why || !speaks())) write($('heard-words'), speaks() ? listening.why : hint());
+  if (!question && !talking && (listening.why || !speaks())) showHint(speaks() ? listening.why : hint());
 }
 
 /* Speaking. */

@@ -59,14 +59,28 @@ export function makeConversation() {
       wish.waits && make('p', { class: 'why', text: 'Pending. Say “never mind” to take it back.' }),
       ...wish.said.map((line) => make('p', { class: 'car-said' }, make('b', { text: 'The car says ' }), `“${line}”`)),
       wish.thoughts && wish.thoughts !== wish.why && section('It thinks', make('p', { class: 'thoughts', text: wish.thoughts })),
-      wish.source && section(wish.policy === 'parameters' ? 'It sets' : 'It drives by', code(wish, entry)),
-      wish.verdicts.length && section('Checks', ...checks(wish, entry)),
+      ...refusedBy(wish),
       shielded.length && section('The shield stepped in', make('ul', { class: 'plain shielded' }, ...shielded.map((text) => make('li', { text })))),
       wish.recalled.length && section('From what it knows of you', make('ul', { class: 'plain' }, ...wish.recalled.map((text) => make('li', { text })))),
       wish.opinion && section('You said of it', make('p', { text: `“${wish.opinion}”` })),
-      wish.stages.total_s !== null && section(`From ${wish.spoken ? 'your last word' : 'Enter'} to the first change`, latency(wish)),
       wish.remembered && make('p', { class: 'fine', text: wish.remembered }),
+      detail(entry),
     ].filter(Boolean);
+  }
+
+  /* What the passenger need not know; on a small screen it is folded. */
+  function detail(entry) {
+    const { told: wish } = entry;
+    const parts = [
+      wish.source && section(wish.policy === 'parameters' ? 'It sets' : 'It drives by', code(wish, entry)),
+      wish.verdicts.length && section('Checks', ...checks(wish, entry)),
+      wish.stages.total_s !== null && section(`From ${wish.spoken ? 'your last word' : 'Enter'} to the first change`, latency(wish)),
+    ].filter(Boolean);
+    if (!parts.length) return null;
+    const folded = make('details', { class: 'detail', open: entry.detailed ?? matchMedia('(min-width: 46.01rem)').matches },
+      make('summary', { 'data-part': 'detail', text: 'How it decided' }), ...parts);
+    folded.firstChild.addEventListener('click', () => { entry.detailed = !folded.open; });
+    return folded;
   }
 
   const section = (title, ...content) => make('section', { class: 'part' }, make('h3', { text: title }), ...content);
@@ -88,14 +102,21 @@ export function makeConversation() {
     return list;
   }
 
+  const failed = (one) => !one.passed && one.compared !== false;
+
   /* What did not pass is always seen; what passed, on demand. */
+  function refusedBy(wish) {
+    const found = wish.verdicts.filter(failed);
+    return found.length ? [section('Did not pass', make('ul', { class: 'verdicts' }, ...found.map(verdict)))] : [];
+  }
+
   function checks(wish, entry) {
-    const [passed, failed] = [wish.verdicts.filter(proven), wish.verdicts.filter((one) => !proven(one))];
+    const [passed, open] = [wish.verdicts.filter(proven), wish.verdicts.filter((one) => !proven(one) && !failed(one))];
     const all = make('details', { class: 'checked', open: entry.checked },
       make('summary', { 'data-part': 'checks' }, make('span', { class: 'sign', 'aria-hidden': 'true', text: '✓' }), ` ${passed.length} passed: ${passed.map((one) => checkName(one.check)).join(', ')}`),
       make('ul', { class: 'verdicts' }, ...passed.map(verdict)));
     all.addEventListener('toggle', () => { entry.checked = all.open; });
-    return [failed.length ? make('ul', { class: 'verdicts' }, ...failed.map(verdict)) : null, passed.length ? all : null].filter(Boolean);
+    return [open.length ? make('ul', { class: 'verdicts' }, ...open.map(verdict)) : null, passed.length ? all : null].filter(Boolean);
   }
 
   /* Only what was shown to be right gets a tick; where nothing was compared, that is said. */

@@ -1,6 +1,13 @@
 /* Numbers and states as people read them. */
 
-export const kmh = (mps) => Math.round(mps * 3.6);
+/* Speeds whole, in the unit the person last used; a limit is rounded down, but for what storing it has cost. */
+let unit = 'km/h';
+const OF = { 'km/h': 3.6, mph: 2.23694 };
+export const unitNow = () => unit;
+export const speakIn = (told) => { unit = told; };
+export const whole = (mps) => Math.round(Math.abs(mps) * OF[unit]);
+export const atMost = (mps) => Math.floor(mps * OF[unit] + 0.05);
+export const pace = (mps) => `${whole(mps)} ${unit}`;
 export const seconds = (s) => (s < 0.995 ? `${Math.round(s * 100) * 10} ms` : `${s.toFixed(s < 9.95 ? 1 : 0)} s`);
 
 /* Stage of a wish: [sign, words, tone]. */
@@ -27,9 +34,10 @@ export function stageWords(wish) {
   return [sign, words[0].toUpperCase() + words.slice(1), tone];
 }
 
-/* Where the car is going, and how far that is by road. */
-export function goalWords({ name, left_m: left }) {
-  return `To ${name || 'the destination'}, ${left < 1000 ? `${Math.round(left / 10) * 10} m` : `${(left / 1000).toFixed(1)} km`}`;
+/* Where the car is going, how far that is by road, and about how long it takes. */
+export function goalWords({ name, left_m: left, left_s: time }) {
+  const far = left < 1000 ? `${Math.round(left / 10) * 10} m` : `${(left / 1000).toFixed(1)} km`;
+  return `To ${name || 'the destination'}, ${far}${time ? `, about ${time < 50 ? `${Math.max(1, Math.round(time / 10)) * 10} s` : `${Math.round(time / 60)} min`}` : ''}`;
 }
 
 export function levelWords(scene) {

@@ -1,0 +1,58 @@
+"""A benchmark run from Python: what `chauffeur.run_benchmark` does, and its rows as a notebook shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.progress import Standing
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.store import Row
+from chauffeur.hmi.notebook import library
+from chauffeur.planners.base import Answerer, Planner
+from chauffeur.planners.registry import make_answerer, make_planner
+
+
+def run_named(name: str, planner: str | Planner | Answerer, *, out: Path, workers: int, **options: Any) -> Rows:
+    """Run an installed benchmark; see `chauffeur.run_benchmark`."""
+    benchmark = make_benchmark(name, **options)
+    make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
+    asked = make(planner) if make is not None and isinstance(planner, str) else planner
+    run = BenchRun(out, benchmark, None if make is None or isinstance(asked, str) else asked)
+    return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
+
+
+def _unwatched(standing: Standing) -> None:
+    del standing
+
+
+class Rows(list[Row]):
+    """Rows of a benchmark run: a list, with a table for people and one for pandas.
+
+    Attributes:
+        folder: The run's folder.
+    """
+
+    def __init__(self, rows: Iterable[Row], folder: Path) -> None:
+        """Args: the rows; the folder they are stored in."""
+        super().__init__(rows)
+        self.folder = folder
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<{len(self)} rows of the run in {str(self.folder)!r}>"
+
+    def _repr_markdown_(self) -> str:
+        """The run's table of results, as `table.md` has it."""
+        return (self.folder / "table.md").read_text(encoding="utf-8")
+
+    def frame(self) -> Any:
+        """One row an item as a `pandas.DataFrame`; `plan.usage.requests` is the column of a nested value.
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+        """
+        return library("pandas", "A data frame").json_normalize(list(self))

@@ -1,0 +1,1 @@
+"""The lab's commands: benchmarks, reports, training. They come with `chauffeur-lab`."""
