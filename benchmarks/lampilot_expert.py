@@ -33,6 +33,7 @@ from chauffeur.driving.rehearsal import best_of
 
 from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.lampilot.expert import EXPERT, expert_program, variants
+from chauffeur.bench.lampilot.rehearsal import best_of
 from chauffeur.bench.lampilot.rehearse import rehearsed
 from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.driving.episode import drive_program

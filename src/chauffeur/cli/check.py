@@ -100,12 +100,27 @@ def benchmark(
     from chauffeur.bench.kernel.conformance import check_benchmark
     from chauffeur.concept.registry import plugin_at
 
-    given = _options(option or [])
+    given = read_options(option or [])
     own = ":" in name
     _tell(check_benchmark(benchmark_from(plugin_at(name), name, **given) if own else make_benchmark(name, **given)))
 
 
-def _options(given: list[str]) -> dict[str, Any]:
+@check_app.command(epilog=EXAMPLES)
+def api(
+    name: Annotated[str, typer.Argument(metavar="API", help="A registered driving API, or MODULE:NAME.")],
+) -> None:
+    """Ask a driving API of your own on a motorway and at a crossing: its shape, answers, repetition and time.
+
+    Exit code 1 where a check finds something.
+    """
+    from chauffeur.concept.registry import load_plugin, plugin_at
+    from chauffeur.driving.conformance import check_api
+    from chauffeur.programs.catalogue import GROUP
+
+    _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
+
+
+def read_options(given: list[str]) -> dict[str, Any]:
     """Options of a benchmark: numbers and truth values as JSON writes them, all else as text. Raises ConfigError."""
     found: dict[str, Any] = {}
     for text in given:

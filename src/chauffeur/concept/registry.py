@@ -21,6 +21,7 @@ GROUPS: Final = (
     "chauffeur.worlds",
     "chauffeur.planners",
     "chauffeur.executors",
+    "chauffeur.apis",
     "chauffeur.checks",
     "chauffeur.benchmarks",
     "chauffeur.memories",

@@ -16,7 +16,7 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
-from chauffeur.bench.lampilot.report import JUDGE, TABLES
+from chauffeur.bench.lampilot.report import CARD, JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.concept import ConfigError, PlanRequest
@@ -86,6 +86,7 @@ class LampilotBenchmark:
     id = BENCH_VERSION
     tables: tuple[TableSpec, ...] = TABLES
     judge = JUDGE
+    card = CARD
 
     def __init__(self, frozen: Frozen, requests: Requests | None = None, ruler: str = "origin") -> None:
         """Make it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
+from chauffeur.bench.lampilot.report import PASSENGERS_CARD
 from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.passengers.loader import as_dataset, load_wishes
 from chauffeur.bench.passengers.requests import PassengerRequests
@@ -21,7 +22,13 @@ def requests_of(setting: Setting) -> PassengerRequests:
     return PassengerRequests(PlainRequests.of(setting, LAMPILOT_LIMITS), load_wishes())
 
 
-def passengers(planner: str = "onboard", setting: Setting = "few-shot") -> LampilotBenchmark:
+class PassengersBenchmark(LampilotBenchmark):
+    """All wishes; an answer is right where it drives, asks back or declines as their card says."""
+
+    card = PASSENGERS_CARD
+
+
+def passengers(planner: str = "onboard", setting: Setting = "few-shot") -> PassengersBenchmark:
     """The benchmark, as its entry point gives it."""
     frozen = Frozen.of(as_dataset(), run_config(planner, setting), "")
-    return LampilotBenchmark(frozen, requests_of(setting))
+    return PassengersBenchmark(frozen, requests_of(setting))

@@ -1,11 +1,22 @@
-"""What the lab adds to `chauffeur`: `bench`, `view`, `report`, `model`."""
+"""What the lab adds to `chauffeur`: `evaluate`, `bench`, `view`, `report`, `model`."""
 
 from __future__ import annotations
 
 import typer
 
 from chauffeur.cli.examples import help_text
-from chauffeur.cli.lab import adapt_vlm, coach, coach_town, quantise_vlm, report, scenes, scenes_frames, train, view
+from chauffeur.cli.lab import (
+    adapt_vlm,
+    coach,
+    coach_town,
+    evaluate,
+    quantise_vlm,
+    report,
+    scenes,
+    scenes_frames,
+    train,
+    view,
+)
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.policies import policies_app
 
@@ -27,6 +38,9 @@ def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
         view.view
     )
     app.command(epilog=report.EXAMPLES, rich_help_panel=look)(report.report)
+    app.command(
+        epilog=evaluate.EXAMPLES, rich_help_panel=measure, short_help="One planner on all benchmarks: a score card."
+    )(evaluate.evaluate)
     app.add_typer(bench_app, name="bench", rich_help_panel=measure, epilog=BENCH_EXAMPLES)
     bench_app.command(epilog=coach.EXAMPLES, short_help="Human feedback on LaMPilot-Bench (Tab. IV).")(coach.coach)
     bench_app.command("coach-town", epilog=coach_town.EXAMPLES, short_help="Human feedback in towns (Tab. V).")(
