@@ -29,8 +29,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from chauffeur.driving.rehearsal import best_of
-
 from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.lampilot.expert import EXPERT, expert_program, variants
 from chauffeur.bench.lampilot.rehearsal import best_of
