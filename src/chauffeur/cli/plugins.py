@@ -64,7 +64,8 @@ def _state(one: Plugin, fault: str) -> Text:
 
     from chauffeur.cli.console import plain
 
-    said = plain(f"{one.package or 'a package without a name'} {one.version}".strip())
+    version = "" if one.built_in else one.version  # of ours `chauffeur --version` tells it
+    said = plain(f"{one.package or 'a package without a name'} {version}".strip())
     said.append(", built in" if one.built_in else ", third party", "" if one.built_in else "cyan")
     if one.shadowed:
         said.append("; not used: its name is taken", "yellow")

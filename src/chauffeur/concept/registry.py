@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from chauffeur.concept.errors import ChauffeurError, ConfigError
+from chauffeur.concept.extras import LAB
 
 GROUPS: Final = (
     "chauffeur.worlds",
@@ -27,8 +28,8 @@ GROUPS: Final = (
     "chauffeur.commands",
 )
 """Entry-point groups that are read, in the order of the loop."""
-OWN: Final = ("chauffeur", "chauffeur-lab")
-"""The distributions whose parts are built in."""
+OWN: Final = ("chauffeur", LAB)
+"""Distributions whose parts are built in."""
 
 
 def plugin_names(group: str) -> tuple[str, ...]:
