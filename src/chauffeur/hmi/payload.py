@@ -33,7 +33,7 @@ from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import stretches_of
-from chauffeur.hmi.road import Bounds, PaintedRoad, as_json, draw_road, track_box
+from chauffeur.hmi.road import Bounds, PaintedRoad, draw_road, road_json, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 from chauffeur.hmi.wanted import goal_of, wanted
 from chauffeur.safety.faithfulness import KINDS, score_words
@@ -280,7 +280,7 @@ def _drive(recorded: RecordedTrip) -> Json | None:
     return {
         "time": [round(s.time_s, 2) for s in shots],
         "camera": {"along": camera.along, "box": [round(edge, 2) for edge in camera.box.edges]},
-        "road": as_json(road),
+        "road": road_json(road),
         "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
         "cones": [_body(o) for o in shots[0].objects if o.kind == "static"],
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},

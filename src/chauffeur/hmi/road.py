@@ -1,6 +1,6 @@
 """A road as it looks from above: surfaces, painted lines, signs and street names, worked out from lane geometry.
 
-Every picture of a road is drawn from here: the pages' canvas (`as_json`, drawn by `assets/drawer.js`), filmstrips,
+Every picture of a road is drawn from here: the pages' canvas (`road_json`, drawn by `assets/drawer.js`), filmstrips,
 town maps and maps of routes (`stills`). Worlds give centrelines only; here they are in the frame of pictures
 (`view`), with y downwards. A line between two lanes of one road is dashed, towards an emergency lane or the verge
 solid, between opposite directions a centre line. An edge that lies on another lane's surface is not painted, and the
@@ -111,7 +111,7 @@ class PaintedRoad:
     names: tuple[StreetName, ...] = ()
 
 
-def as_json(road: PaintedRoad) -> dict[str, Any]:
+def road_json(road: PaintedRoad) -> dict[str, Any]:
     """The road as `drawer.js` takes it, in m: `p` and `line` hold x, y, x, y ..."""
     return {
         "surfaces": [{"p": flat(s.centre_m), "w": round(s.width_m, 2), "k": s.kind} for s in road.surfaces],

@@ -263,11 +263,10 @@ def score(folder: Path, stages: StageStore[Any]) -> list[Row]:
     files = {
         "results.jsonl": "".join(line + "\n" for line in lines),
         "table.md": report_markdown(benchmark.id, filled, notes),
-        "report.json": _json(told),
-        "provenance.json": _json(manifest.provenance(getattr(benchmark, "provenance", {}))),
+        "report.json": as_json(told),
+        "provenance.json": as_json(manifest.provenance(getattr(benchmark, "provenance", {}))),
     }
-    for name, text in files.items():
-        publish(folder / name, text.encode("utf-8", "replace"), "run's result")
+    write_results(folder, files)
     return rows
 
 
@@ -277,8 +276,15 @@ def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
     return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
 
 
-def _json(value: Any) -> str:
+def as_json(value: Any) -> str:
+    """A file's text."""
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
+
+
+def write_results(folder: Path, files: Mapping[str, str]) -> None:
+    """Write what came of a run. Raises DataError: it cannot be written."""
+    for name, text in files.items():
+        publish(folder / name, text.encode("utf-8", "replace"), "run's result")
 
 
 def _fields(row: Any) -> Row:

@@ -12,7 +12,7 @@ from chauffeur.concept import Lane, RoadGraph
 from chauffeur.concept.units import SpeedUnit
 from chauffeur.driving.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
 from chauffeur.geometry import Polyline
-from chauffeur.hmi.road import Bounds, as_json, draw_road, flat
+from chauffeur.hmi.road import Bounds, draw_road, flat, road_json
 from chauffeur.hmi.view import as_picture
 from chauffeur.hmi.words import pace_of, passenger_units
 
@@ -63,7 +63,7 @@ def drawn(road: Road) -> dict[str, Any]:
             for lane in lanes
             if lane.kind not in _ON_FOOT
         ],
-    } | as_json(draw_road(graph, (), everything.grown(_MARGIN_M), signs))
+    } | road_json(draw_road(graph, (), everything.grown(_MARGIN_M), signs))
 
 
 MOST_WAITING: Final = 500
