@@ -28,8 +28,8 @@ UNFINISHED: Final = 3
 """Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
 
 
-def _effort(given: Mapping[str, Any]) -> Effort:
-    """How hard a run works. Raises ConfigError for options that contradict each other."""
+def effort(given: Mapping[str, Any]) -> Effort:
+    """How hard a run works, of the options of running. Raises ConfigError for some that contradict each other."""
     from functools import partial
 
     from chauffeur.bench.kernel.budget import Price, SpendingBudget
@@ -37,7 +37,7 @@ def _effort(given: Mapping[str, Any]) -> Effort:
     from chauffeur.bench.kernel.run import Effort
     from chauffeur.concept.needs import needs
 
-    ray, price = given["ray"], given.get("price")
+    ray, price = given.get("ray"), given.get("price")
     if ray is not None and given["workers"] is not None:
         raise ConfigError("--workers is for this machine; a Ray cluster knows its own size.", hint="Leave one out.")
     engine: Any = LocalEngine
@@ -75,7 +75,7 @@ def run_named(name: str, make: Any, options: Mapping[str, Any], given: Mapping[s
     from chauffeur.cli.console import stdout
     from chauffeur.cli.lab.bench_progress import shown
 
-    console, work = stdout(), _effort(given)
+    console, work = stdout(), effort(given)
     part = WHOLE if given["shard"] is None else Shard.parse(given["shard"], os.environ)
     bench = benchmark_from(make, name, **options)
     planner = given.get("planner") or ("onboard" if bench.asks == "plans" else None)
