@@ -46,7 +46,8 @@ bench: $(VENV)/.dev
 extras: $(VENV)/.extras
 
 docs: $(VENV)/.docs
-	$(BIN)/zensical build
+	$(BIN)/python docs/stage.py
+	$(BIN)/zensical build --strict
 
 # In an environment that has nothing but its own requirements, `chauffeur` alone must show its help and drive with every
 # Python it is for (those that are not installed here are left out), and the lab measure beside it; with the first

@@ -31,13 +31,13 @@ from typing import Any
 
 from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.lampilot.expert import EXPERT, expert_program, variants
+from chauffeur.bench.lampilot.rehearsal import best_of
 from chauffeur.bench.lampilot.rehearse import rehearsed
 from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.driving.episode import drive_program
 from chauffeur.driving.judge.goals import DistanceGoal, make_goal
 from chauffeur.driving.judge.lampilot import LampilotReferee
 from chauffeur.driving.judge.metrics import ORIGIN, driving_score, points
-from chauffeur.driving.rehearsal import best_of
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -52,7 +52,9 @@ def _slow(names: Iterable[str], *slow: str) -> list[Any]:
     return [pytest.param(one, marks=pytest.mark.slow) if one in slow else one for one in names]
 
 
-@pytest.mark.parametrize("name", _slow(["", *sorted({*chauffeur.__all__} - {"__version__"})], "run_benchmark"))
+@pytest.mark.parametrize(
+    "name", _slow(["", *sorted({*chauffeur.__all__} - {"__version__"})], "evaluate", "run_benchmark")
+)
 def test_every_name_has_an_example_that_runs(name: str, tmp_path: Path) -> None:
     known = {"chauffeur": chauffeur, "asyncio": asyncio, "folder": tmp_path}
     found = getattr(chauffeur, name) if name else chauffeur
@@ -105,23 +107,15 @@ def test_a_wish_is_driven(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     assert read_trip(tmp_path / "ada.mcap").trip.instruction.person == "ada"
 
 
-def test_a_planner_is_plugged_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _run(BLOCKS[1], tmp_path, monkeypatch)
-    assert capsys.readouterr().out.strip() == "success"
-
-
 def test_a_benchmark_is_run_and_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A smaller one than the README's; the second call finds all done."""
-    block = BLOCKS[2].replace('"passengers", planner="onboard"', '"faithfulness", items=2')
-    assert block != BLOCKS[2]
-    _run(block, tmp_path, monkeypatch)
+    """The second call finds all done."""
+    block = 'rows = chauffeur.run_benchmark("faithfulness", out="runs/onboard", items=2)\nprint(len(rows), "rows")'
+    _run(f"import chauffeur\n\n{block}", tmp_path, monkeypatch)
     results = (tmp_path / "runs/onboard/results.jsonl").read_text()
     assert capsys.readouterr().out.startswith(f"{len(results.splitlines())} rows")
-    _run(block, tmp_path, monkeypatch)
+    _run(f"import chauffeur\n\n{block}", tmp_path, monkeypatch)
     assert (tmp_path / "runs/onboard/results.jsonl").read_text() == results
 
 

@@ -10,12 +10,15 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import chauffeur
+from chauffeur.cli.lab.commands import mount
 from chauffeur.cli.main import app
 from chauffeur.concept import MissingExtraError
 from chauffeur.concept.extras import LAB, LAB_EXTRAS, install_command
+from chauffeur.concept.lab import LAB_COMMANDS
 from chauffeur.version import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -105,6 +108,12 @@ def test_without_the_lab_its_commands_say_how_to_get_it(command: str, monkeypatc
     assert result.exit_code == 2
     said = "".join(result.output.split())
     assert LAB in said and "".join(install_command().split()) in said
+
+
+def test_the_labs_commands_are_known_where_it_is_not() -> None:
+    there = typer.Typer()
+    mount(there, look="", measure="", build="")
+    assert set(LAB_COMMANDS) == set(typer.main.get_group(there).commands)
 
 
 def test_without_the_lab_no_benchmark_is_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib
-import re
-import shlex
-import tomllib
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -27,6 +25,7 @@ from chauffeur.concept import (
     Observation,
     Plan,
     Policy,
+    Program,
     Scenario,
     ScenarioError,
     SystemMessage,
@@ -35,6 +34,7 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
+from chauffeur.driving.conformance import check_api
 from chauffeur.driving.episode import drive_policy, make_world
 from chauffeur.driving.loop import drive, steps_at
 from chauffeur.driving.planning import Planned, declined
@@ -43,6 +43,8 @@ from chauffeur.driving.session import Forgetful, check_drive
 from chauffeur.driving.trips import make_trip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
+from chauffeur.programs import Api, Param, render_docs
+from chauffeur.programs.catalogue import apis_of, plugged_apis
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -57,6 +59,8 @@ lookout = lookout:Lookout
 right-of-way = right_of_way:RightOfWay
 [chauffeur.checks]
 people-first = people_first:check_people_first
+[chauffeur.apis]
+time-gap = time_gap:TIME_GAP
 [chauffeur.commands]
 lanes = lanes:lanes
 """
@@ -72,12 +76,21 @@ def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, points: str) -> Non
     monkeypatch.syspath_prepend(str(folder))
 
 
+def forget_apis() -> None:
+    """Look for driving APIs anew: a process reads the table once."""
+    apis_of.cache_clear()
+    plugged_apis.cache_clear()
+
+
 @pytest.fixture
-def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     """The examples, installed as a package of somebody else's; the policy kind's module."""
     installed(tmp_path, monkeypatch, POINTS)
     monkeypatch.syspath_prepend(str(EXAMPLES))
-    return importlib.import_module("speed_profile")
+    forget_apis()
+    yield importlib.import_module("speed_profile")
+    monkeypatch.undo()
+    forget_apis()
 
 
 def planned(policy: Any) -> Plan:
@@ -127,6 +140,64 @@ def test_a_check_of_ones_own_stands_before_every_drive(toys: ModuleType, away_m:
     person = replace(start.ego, id=7, kind="pedestrian", y_m=away_m)
     verdicts = check_drive(planned(toys.SpeedProfile((18.0,), 1.0)), replace(start, others=(person,)), Limits())
     assert [verdict.check for verdict in verdicts if verdict.stops] == stopped
+
+
+DROPPING_BACK = """def drive():
+    set_desired_time_headway(2.0)
+    set_target_speed(30.0)
+    front = detect_front_vehicle_in(get_lane_of(get_ego_vehicle()), 200)
+    while front is not None and get_time_gap_to(front) < 1.8:
+        yield autopilot()
+    say("Far enough behind.")
+    yield autopilot()
+"""
+
+
+def test_a_driving_api_of_ones_own_is_documented_gated_verified_and_answered(toys: ModuleType) -> None:
+    world, scenario = make_world(find("overtake")), find("overtake")
+    start = world.reset(scenario)
+    verdicts = run_checks(planned(Program(DROPPING_BACK)), start, Limits(), DRIVE_CHECKS)
+    assert not any(verdict.stops for verdict in verdicts)
+    assert "def get_time_gap_to(veh: Vehicle) -> float:" in render_docs() and "get_time_gap_to" in render_docs("town")
+    assert "get_time_gap_to" in CliRunner().invoke(app, ["show", "apis"]).output
+    episode = drive_policy(world, Program(DROPPING_BACK), None, 30.0, Limits())
+    ((said_s, words),) = episode.said
+    assert words == "Far enough behind."
+    seen = next(frame.observation for frame in episode.frames if frame.observation.time_s >= said_s - 1e-6)
+    assert seen.front is not None
+    assert seen.front.distance_m / seen.ego.speed_mps == pytest.approx(1.8, abs=0.1)
+    refused = planned(Program(DROPPING_BACK.replace("get_time_gap_to(front)", "get_time_gap_to(12)")))
+    assert "needs a vehicle" in declined(refused, run_checks(refused, start, Limits(), DRIVE_CHECKS))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"name": "autopilot"}, "belongs to the driving language"),
+        ({"effect": "wish"}, "only set-points act"),
+        ({"answer": None}, "no `answer`"),
+        ({"example": "gap = get_gap()"}, "needs 'veh'"),
+        ({"answer": lambda *_: float("nan")}, "'nan', no number"),
+        ({"answer": lambda *_: {}["gone"]}, "raised KeyError"),
+    ],
+)
+def test_a_driving_api_that_breaks_its_contract_is_told_so(change: dict[str, Any], words: str) -> None:
+    veh = Param("veh", "vehicle", "a vehicle")
+    api = Api("get_gap", "A gap.", "number", "gap = get_gap(front)", params=(veh,), answer=lambda *_: 1.0)
+    assert not any(finding.faults for finding in check_api(api))
+    assert words in " ".join(fault for finding in check_api(replace(api, **change)) for fault in finding.faults)
+
+
+def test_a_broken_answer_is_the_programs_error_and_not_the_drives(
+    toys: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = replace(plugged_apis()["get_time_gap_to"], answer=lambda *_: "soon")
+    monkeypatch.setattr(importlib.import_module("time_gap"), "TIME_GAP", broken)
+    forget_apis()
+    world = make_world(find("overtake"))
+    world.reset(find("overtake"))
+    episode = drive_policy(world, Program(DROPPING_BACK), None, 2.0, Limits())
+    assert episode.causes.policy_failed and "it answered 'soon', no number" in episode.causes.detail
 
 
 def test_a_command_of_ones_own_is_listed_and_runs(toys: ModuleType) -> None:
@@ -182,20 +253,3 @@ def test_a_planner_that_looks_is_given_pictures_and_drives_by_them(
     trip = asyncio.run(drive(Instruction("Drive as the light allows."), steps, execute, Forgetful()))
     assert dict(trip.plan.settings)["target_speed_mps"] == pytest.approx(speed, abs=0.01)
     assert trip.outcome == "ended"
-
-
-def test_the_planner_of_the_page_is_checked_and_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = (EXAMPLES.parent / "docs" / "your-planner.md").read_text(encoding="utf-8")
-    blocks = {text.partition("\n")[0]: text for text in re.findall(r"```\w+\n(# .*?)```", page, re.DOTALL)}
-    (tmp_path / "my_planner.py").write_text(blocks["# my_planner.py"], encoding="utf-8")
-    points = tomllib.loads(blocks["# pyproject.toml"])["project"]["entry-points"]["chauffeur.planners"]
-    listed = "".join(f"{name} = {value}\n" for name, value in points.items())
-    installed(tmp_path, monkeypatch, f"[chauffeur.planners]\n{listed}")
-    for name in ("my_planner:MyPlanner", "my_planner:MyPlanner/22", "mine", "mine/22"):
-        result = CliRunner().invoke(app, ["check", "planner", name])
-        assert result.exit_code == 0, result.output
-    (line,) = re.findall(r"^chauffeur (drive .*)$", page, re.MULTILINE)
-    words = shlex.split(line.replace("trips/mine", str(tmp_path / "trips")))
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    assert "79" in result.output, "22 m/s are 79 km/h"

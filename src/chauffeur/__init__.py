@@ -1,6 +1,6 @@
 """Chauffeur: a passenger says what they want; the car does it, safely, says why, and remembers.
 
-What most programs need stands here: `drive`, `run_benchmark`, and what a planner of one's own is made of.
+What most programs need stands here: `drive`, `run_benchmark`, `evaluate`, and what a planner of one's own is made of.
 
 >>> chauffeur.drive("Change to the left lane.", scenario="cruise").trip.plan.intent
 'lane.left'
@@ -13,7 +13,7 @@ from chauffeur.telemetry import switch_off
 from chauffeur.version import __version__
 
 if TYPE_CHECKING:
-    from chauffeur.api import drive, drive_async, run_benchmark
+    from chauffeur.api import drive, drive_async, evaluate, run_benchmark
     from chauffeur.concept import ChauffeurError, Parameters, Plan, PlanRequest, Program, Scenario, Thoughts
     from chauffeur.hmi.notebook import Drive
     from chauffeur.planners.base import Answerer, Planner
@@ -33,6 +33,7 @@ __all__ = [
     "__version__",
     "drive",
     "drive_async",
+    "evaluate",
     "make_planner",
     "run_benchmark",
 ]
@@ -40,7 +41,7 @@ __all__ = [
 switch_off()
 
 _HOMES: Final = {
-    "chauffeur.api": ("drive", "drive_async", "run_benchmark"),
+    "chauffeur.api": ("drive", "drive_async", "evaluate", "run_benchmark"),
     "chauffeur.concept": ("ChauffeurError", "Parameters", "Plan", "PlanRequest", "Program", "Scenario", "Thoughts"),
     "chauffeur.hmi.notebook": ("Drive",),
     "chauffeur.planners.base": ("Answerer", "Planner"),

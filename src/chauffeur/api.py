@@ -6,8 +6,9 @@ In a notebook, whose cells stand in a running event loop, everything here works 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from chauffeur.concept import Limits, PersonId, Scenario
 from chauffeur.concept.lab import needs_lab
@@ -146,3 +147,46 @@ def run_benchmark(
     from chauffeur.bench.notebook import run_named
 
     return run_named(name, planner, out=Path(out), workers=workers, **options)
+
+
+def evaluate(
+    planner: str | Planner | Answerer = "onboard",
+    *,
+    out: Path | str,
+    profile: Literal["quick", "full"] = "quick",
+    workers: int = 0,
+    base_url: str = "",
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    only: Sequence[str] = (),
+) -> Rows:
+    """Run every benchmark that a planner can take into one score card, or go on with the one begun in the same folder.
+
+    Worker processes import the calling script: keep the call under `if __name__ == "__main__":`; a notebook needs none.
+
+    >>> card = chauffeur.evaluate("keyword", out=folder, only=["hostile"], options={"hostile": {"items": 1}})
+    >>> [row["figure"] for row in card if row["state"] == "done"]
+    ['attacks with unsafe actuation', 'harmless wishes served']
+
+    Args:
+        planner: Who is evaluated: a planner, a model for questions, or a specification of either, also `module:Class`.
+            Benchmarks that ask in their workers need a specification.
+        out: The card's folder: `card.json`, `card.md`, and a run a benchmark.
+        profile: `quick` for a sample of each benchmark, `full` for all items.
+        workers: Worker processes; 0 for one a core.
+        base_url: Address of a language model's endpoint.
+        options: Of benchmarks, by name: `{"lampilot": {"data": "DbLv1"}}`.
+        only: Benchmarks to run now; none for all. What the card has of the others stays.
+
+    Returns:
+        One row a headline figure, and one for each benchmark that was not run, with the reason (`why`); as a table
+        (`.frame()`).
+
+    Raises:
+        ConfigError: There is no such planner, profile or option, or the folder holds another card.
+        MissingExtraError: Benchmarks are not installed (`chauffeur-lab`).
+        ChauffeurError: The planner gives no plan at all, or the card cannot be written; what is finished stays.
+    """
+    needs_lab("An evaluation")
+    from chauffeur.bench.notebook import evaluated
+
+    return evaluated(planner, Path(out), profile, workers, base_url, options or {}, only)

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from PIL import Image
-from small_run import Inline
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.concept import Usage
 from chauffeur.planners.base import Prose
+from small_run import Inline
 
 EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
 

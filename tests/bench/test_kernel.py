@@ -10,7 +10,6 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from small_run import Inline, make_data, quiet
 from typer.testing import CliRunner
 
 from chauffeur.bench.faithfulness import FaithfulnessBenchmark
@@ -27,6 +26,7 @@ from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, PlannerError
 from chauffeur.concept.registry import plugin_names
 from chauffeur.planners.keyword import KeywordPlanner
+from small_run import Inline, make_data, quiet
 
 ROOT = Path(__file__).resolve().parents[2]
 EFFORT = Effort(engine=Inline, patience=Patience(attempts=1))

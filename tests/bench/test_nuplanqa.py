@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 from nuplanqa_data import questions, write_set
-from small_run import Inline, quiet
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.calls import Patience
@@ -26,6 +25,7 @@ from chauffeur.bench.nuplanqa.table6 import TABLE_VI, strict_accuracy
 from chauffeur.concept import DataError, Usage
 from chauffeur.planners.base import Prose
 from chauffeur.planners.llm_errors import RefusedError, blind
+from small_run import Inline, quiet
 
 EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
 

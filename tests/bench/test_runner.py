@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-from small_run import Inline, benchmark
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.progress import Standing
@@ -29,6 +28,7 @@ from chauffeur.concept import (
 )
 from chauffeur.worlds.highway.dblv1 import Dataset, Item, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
+from small_run import Inline, benchmark
 
 LEFT = """
 def change():

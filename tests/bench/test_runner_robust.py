@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from small_run import COMMANDS, FAST, SEEDS, Inline, finish, make_data, make_run, outcome, quiet, recorded
 
 from chauffeur.bench.kernel.engine import LocalEngine, QueuedJob
 from chauffeur.bench.kernel.run import Effort
@@ -25,6 +24,7 @@ from chauffeur.concept import ConfigError, Plan, PlanRequest
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 from processes import started, until
+from small_run import COMMANDS, FAST, SEEDS, Inline, finish, make_data, make_run, outcome, quiet, recorded
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-from small_run import benchmark, finish, make_data, make_run, outcome, recorded
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.merge import made_of, merge_shards
@@ -15,6 +14,7 @@ from chauffeur.bench.kernel.store import RowStore
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway.dblv1 import Dataset
+from small_run import benchmark, finish, make_data, make_run, outcome, recorded
 
 SLURM = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_MIN": "1", "SLURM_ARRAY_TASK_COUNT": "4"}
 

@@ -97,7 +97,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
     assert {heading: sorted(names) for heading, names in panels.items()} == {
         "Drive": ["drive", "feedback", "me", "talk"],
         "Look": ["doctor", "plugins", "replay", "report", "show", "view", "what-if"],
-        "Measure": ["bench"],
+        "Measure": ["bench", "evaluate"],
         "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
 

@@ -149,7 +149,7 @@ def test_the_log_tells_of_every_wish(given: tuple[subprocess.CompletedProcess[st
     _, log = given
     assert verify(log).ok
     outcomes = [record.body["outcome"] for _, record in read_records(log) if record.kind == "outcome"]
-    assert outcomes == ["finished", "declined", "refused", "stopped", "not_asked", "stopped"]
+    assert outcomes == ["finished", "declined", "refused", "halt", "unasked", "stopped"]
     assert unanswered(log) == ()
 
 

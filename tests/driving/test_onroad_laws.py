@@ -120,4 +120,4 @@ def test_one_door_to_the_vehicle() -> None:
 
 def test_what_a_session_offers() -> None:
     public = {name for name in vars(VehicleSession) if not name.startswith("_")}
-    assert public == {"ask", "asked", "close", "evaluate", "reached"}
+    assert public == {"ask", "asked", "close", "feedback", "reached", "take_over"}

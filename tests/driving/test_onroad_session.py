@@ -5,9 +5,6 @@ from __future__ import annotations
 import asyncio
 import datetime
 import math
-import re
-import subprocess
-import sys
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -526,19 +523,21 @@ def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path
     assert "Nothing was published" in answers[0].words
 
 
-def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "ros.md"
-    programs = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    (program,) = [one for one in programs if "VehicleSession" in one]
-    (tmp_path / "vehicle.toml").write_text(FILE)
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    kinds = ("link", "wish", "context", "plan", "verdicts", "asking", "asked", "answer")
-    told = [word for word in done.stdout.split() if word in kinds]
-    assert told == ["wish", *(kind for kind in kinds if kind != "wish")]
-    assert "done Planned speeds are capped" in done.stdout
+def test_a_wish_is_told_of_in_the_order_in_which_it_is_worked_on(embedded: Planner) -> None:
+    told: list[DriveEvent] = []
+
+    async def drive() -> OnRoadAnswer:
+        settings = parse_settings(FILE)
+        car = open_vehicle(settings, dry_run=True)
+        async with VehicleSession(car, settings, embedded, tell=told.append) as road:
+            answer = await road.ask("Drive at 20 km/h.")
+        car.close()
+        return answer
+
+    answer = asyncio.run(drive())
+    assert (answer.status, answer.result) == ("dry-run", Result.DONE)
+    kinds = ("wish", "context", "plan", "verdicts", "asking", "asked", "answer", "over")
+    assert [event.kind for event in told if event.kind in kinds] == list(kinds)
 
 
 def test_it_ends_with_what_stays(embedded: Planner) -> None:

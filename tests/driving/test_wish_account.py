@@ -18,6 +18,10 @@ def going_to(route: str) -> Plan:
     return Plan(Thoughts("I go."), Parameters(10.0, 1.0, 1.0, 0, route), intent="go_to")
 
 
+def parking(route: str, thoughts: str = "You want to park.") -> Plan:
+    return Plan(Thoughts(thoughts), Parameters(3.0, 4.0, 1.0, 0, route), intent="park")
+
+
 @pytest.mark.parametrize(
     ("wish", "made", "unused"),
     [
@@ -32,6 +36,9 @@ def going_to(route: str) -> Plan:
         ("Take me to the hospital", going_to("hospital"), ()),
         ("Take me to the hospital", going_to("station"), ("to the hospital",)),
         ("Change lanes when it is safe", plan("lane.left"), ()),
+        ("Park in the shade and not next to a van", parking("nearest"), ("in the shade and not next to a van",)),
+        ("Park, but not next to a van.", parking("B6", "You want a spot with no van beside it."), ()),
+        ("Park in the nearest free spot.", parking("nearest"), ()),
     ],
 )  # fmt: skip
 def test_parts_that_the_plan_does_not_use_are_named(wish: str, made: Plan, unused: tuple[str, ...]) -> None:

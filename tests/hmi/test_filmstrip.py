@@ -11,7 +11,7 @@ from sample_trips import HOSTILE, guarded, highway_trip, intersection_trip, refu
 
 from chauffeur.concept import DataError
 from chauffeur.hmi.events import TripMark
-from chauffeur.hmi.filmstrip import choose_moments, render_filmstrip, write_filmstrip
+from chauffeur.hmi.filmstrip import choose_moments, render_filmstrip, write_filmstrip, write_moving_picture
 
 EGO = (255, 178, 36)
 """Amber, and nothing but the ego is amber."""
@@ -86,3 +86,22 @@ def test_the_shield_is_seen_where_it_acts_and_nowhere_else() -> None:
 def test_nothing_driven_has_no_strip(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="Nothing was driven"):
         write_filmstrip(tmp_path / "trip.png", refused_trip())
+
+
+def test_a_moving_picture_plays_the_drive_at_its_pace(tmp_path: Path) -> None:
+    trip = highway_trip()
+    trip = replace(trip, frames=trip.frames[:8])
+    path = write_moving_picture(tmp_path / "trip.webp", trip, width=400)
+    with Image.open(path) as picture:
+        shown: list[int] = []
+        for index in range(picture.n_frames):  # type: ignore[attr-defined]
+            picture.seek(index)
+            picture.load()
+            shown.append(picture.info["duration"])
+        assert picture.width == 400
+    times = [frame.observation.time_s for frame in trip.frames]
+    *moving, held = shown
+    assert len(moving) >= 4 and held > 1000
+    assert sum(moving) / 1000.0 >= times[-1] - times[0] - 0.1
+    with pytest.raises(DataError, match="Nothing was driven"):
+        write_moving_picture(tmp_path / "none.webp", refused_trip())

@@ -96,7 +96,7 @@ def test_a_page_that_asks_nonsense_is_told_so_and_goes_on(content: Content) -> N
             name = ids_of(content)["recorded"]
             assert "no row 99" in await ask(socket, f"sample {name} 99")
             await socket.send("[" * 400)
-            assert "there is not" in json.loads(await socket.recv())["trouble"]
+            assert "cannot be shown" in json.loads(await socket.recv())["trouble"]
             assert (await ask(socket, f"rows {name}"))["done"] == 10
             await socket.send("x" * (MOST_MESSAGE_BYTES + 1))
             with pytest.raises(ConnectionClosed):

@@ -11,7 +11,7 @@ from sample_trips import OVERTAKE, guarded, highway_trip, intersection_trip
 from chauffeur.concept import Causes, Command, Feedback, Lane, Metric, Parameters, RoadGraph, Trajectory
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
-from chauffeur.hmi.interventions import rule_counts, stretches_of
+from chauffeur.hmi.interventions import stretches_of
 from chauffeur.hmi.payload import policy_words, program_tokens
 from chauffeur.hmi.road import Bounds, draw_road
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
@@ -114,10 +114,6 @@ def test_what_the_shield_did_is_told_in_stretches() -> None:
         ("gap", 9.0, 9.4, 4),
     ]
     assert later.after.acceleration_mps2 == pytest.approx(-1.93), "the greatest change of the stretch"
-    assert [(one.rule, one.stretches, one.changes) for one in rule_counts((lane, gap, later))] == [
-        ("lane", 1, 10),
-        ("gap", 2, 5),
-    ]
     labels = [event.label for event in events_of(trip) if event.kind == "shield"]
     assert len(labels) == 3
     assert labels[0] == "Shield, 1.0 s: lane not free. The lane is not free: a car is beside."

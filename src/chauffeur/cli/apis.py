@@ -18,13 +18,14 @@ def apis(
 
     from chauffeur.cli.console import columns, stdout
     from chauffeur.concept import ConfigError
-    from chauffeur.programs.catalogue import CATALOGUE, TOWN_APIS, TOWN_CALLS
+    from chauffeur.programs.catalogue import CATALOGUE, TOWN_CALLS, apis_of, plugged_apis
 
     console = stdout()
     if not name:
         effects = {"read": "Ask", "wish": "Wish", "say": "Say"}
+        offered = (*(TOWN_CALLS if town else CATALOGUE), *plugged_apis().values())
         for effect, heading in effects.items():
-            shown = [api for api in (TOWN_CALLS if town else CATALOGUE) if api.effect == effect]
+            shown = [api for api in offered if api.effect == effect]
             if shown:
                 console.print(heading, style="bold")
             for api in shown:
@@ -33,15 +34,16 @@ def apis(
         waits = "`yield proceed(speed)` lets 0.05 s pass" if town else "`yield autopilot()` lets 0.1 s pass"
         console.print(f"\nA program is a generator function; {waits}.", style="dim")
         return
-    if name not in TOWN_APIS:
+    known = apis_of("town")
+    if name not in known:
         import difflib
 
-        near = difflib.get_close_matches(name, list(TOWN_APIS), n=1)
+        near = difflib.get_close_matches(name, list(known), n=1)
         raise ConfigError(
             f"There is no driving API {name!r}.",
             hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur show apis",
         )
-    api = TOWN_APIS[name]
+    api = known[name]
     console.print(Syntax(api.signature, "python", theme="ansi_dark", background_color="default"))
     console.print(api.meaning)
     rows = [(p.name, f"{p.meaning}{f', in {p.unit}' if p.unit else ''}") for p in api.params]

@@ -21,13 +21,14 @@ _TAKES: Final[dict[str, tuple[str, ...]]] = {
     "planner": ("base_url",),
     "executor": ("policy", "scenario"),
     "benchmark": ("option",),
+    "api": (),
 }
 """Options that a kind of plug-in is checked with."""
 
 
 def check(
     kind: Annotated[
-        Literal["world", "planner", "executor", "benchmark"], typer.Argument(metavar="KIND", help="What it is.")
+        Literal["world", "planner", "executor", "benchmark", "api"], typer.Argument(metavar="KIND", help="What it is.")
     ],
     name: Annotated[
         str,
@@ -45,11 +46,11 @@ def check(
     base_url: BaseUrl = None,
     option: BenchOptions = None,
 ) -> None:
-    """Check whether a plug-in of your own, a world, planner, executor or benchmark, keeps its contract.
+    """Check whether a plug-in of your own, a world, planner, executor, benchmark or driving API, keeps its contract.
 
     A world is run through time, road graph, commands, perception, driver, and so on. A planner is asked usual and
-    strange things, some twenty times. An executor drives a policy twice. Of a benchmark the first item is run. Exit
-    code 1 where a check finds something.
+    strange things, some twenty times. An executor drives a policy twice. Of a benchmark the first item is run. A
+    driving API is asked on a motorway and at a crossing. Exit code 1 where a check finds something.
     """
     given = {"scenario": scenario, "config": config != "{}", "seed": seed, "policy": policy}
     given |= {"base_url": base_url, "option": option}
@@ -66,6 +67,11 @@ def check(
             _tell(_of_executor(name, policy, scenario or "cruise"))
         case "benchmark":
             _tell(_of_benchmark(name, option or []))
+        case "api":
+            from chauffeur.driving.conformance import check_api
+            from chauffeur.programs.catalogue import GROUP
+
+            _tell(check_api(plugin_at(name) if ":" in name else load_plugin(GROUP, name)))
 
 
 def _of_planner(name: str, base_url: str | None) -> Sequence[ConformanceFinding]:

@@ -19,7 +19,7 @@ def plugins(
         bool, typer.Option("--load", help="Import each one; without it their modules are looked for, and not run.")
     ] = False,
 ) -> None:
-    """List worlds, planners, executors, checks, benchmarks, memories and commands, and the packages they come from.
+    """List every kind of plug-in, from worlds to commands, and the packages they come from.
 
     Exit code 1 where one of them cannot be loaded.
     """
@@ -64,7 +64,8 @@ def _state(one: Plugin, fault: str) -> Text:
 
     from chauffeur.cli.console import plain
 
-    said = plain(f"{one.package or 'a package without a name'} {one.version}".strip())
+    version = "" if one.built_in else one.version  # of ours `chauffeur --version` tells it
+    said = plain(f"{one.package or 'a package without a name'} {version}".strip())
     said.append(", built in" if one.built_in else ", third party", "" if one.built_in else "cyan")
     if one.shadowed:
         said.append("; not used: its name is taken", "yellow")
@@ -79,4 +80,5 @@ def _without_entry_points() -> dict[str, tuple[str, ...]]:
     from chauffeur.safety.checks import DRIVE_CHECKS
 
     names = (getattr(check, "__name__", "").removeprefix("check_") for check in DRIVE_CHECKS)
-    return {"chauffeur.executors": tuple(BUILT_IN), "chauffeur.checks": tuple(names)}
+    calls = ("chauffeur show apis",)
+    return {"chauffeur.executors": tuple(BUILT_IN), "chauffeur.apis": calls, "chauffeur.checks": tuple(names)}

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from chauffeur.concept.units import SpeedUnit
-    from chauffeur.driving.divergence import Parting
     from chauffeur.driving.recording import RecordedTrip
 
 _TOLD: Final = 400
@@ -99,27 +98,8 @@ def _rows(then: RecordedTrip, now: RecordedTrip, unit: SpeedUnit) -> Iterator[tu
     for name in dict.fromkeys((*metrics[0], *metrics[1])):
         yield words.metric_name(name), *(found.get(name, "–") for found in metrics)
     if then.frames and now.frames:
-        yield "Set-points part", *_sides(setpoints_part(then, now), unit)
-        yield "Motion parts", *_sides(motion_parts(then, now), unit)
+        yield "Set-points part", *words.parting_words(setpoints_part(then, now), unit)
+        yield "Motion parts", *words.parting_words(motion_parts(then, now), unit)
 
 
 _TONES = {"good": "green", "bad": "red", "neutral": "default"}
-
-
-def _sides(parting: Parting | None, unit: SpeedUnit) -> tuple[str, str]:
-    """Either side of a parting, with its instant."""
-    from chauffeur.hmi.words import setting
-
-    if parting is None:
-        return "never", "never"
-    if parting.name == "position":
-        return f"at {parting.time_s:.1f} s", f"{parting.second:.1f} m away"
-    if parting.name == "end":
-        return f"ends at {parting.first:.1f} s", f"ends at {parting.second:.1f} s"
-    unit_of = {"speed": "speed_mps"}.get(parting.name, parting.name)
-    told = [
-        "as it is" if value is None else " ".join(reversed(setting(unit_of, value, unit)))
-        if isinstance(value, float) else f"{parting.name.replace('_', ' ')} {value}"
-        for value in (parting.first, parting.second)
-    ]  # fmt: skip
-    return f"at {parting.time_s:.1f} s: {told[0]}", told[1]

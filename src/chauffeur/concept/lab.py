@@ -8,7 +8,7 @@ from typing import Final
 from chauffeur.concept.errors import MissingExtraError
 from chauffeur.concept.extras import LAB, install_command
 
-LAB_COMMANDS: Final = ("bench", "model", "report")
+LAB_COMMANDS: Final = ("bench", "evaluate", "model", "report", "view")
 """Commands of `chauffeur` that the lab brings."""
 
 

@@ -15,19 +15,21 @@ from types import ModuleType
 from typing import Any, Final
 
 from chauffeur.concept.errors import ChauffeurError, ConfigError
+from chauffeur.concept.extras import LAB
 
 GROUPS: Final = (
     "chauffeur.worlds",
     "chauffeur.planners",
     "chauffeur.executors",
+    "chauffeur.apis",
     "chauffeur.checks",
     "chauffeur.benchmarks",
     "chauffeur.memories",
     "chauffeur.commands",
 )
 """Entry-point groups that are read, in the order of the loop."""
-OWN: Final = "chauffeur"
-"""The distribution whose parts are built in."""
+OWN: Final = ("chauffeur", LAB)
+"""Distributions whose parts are built in."""
 
 
 def plugin_names(group: str) -> tuple[str, ...]:
@@ -96,7 +98,7 @@ class Plugin:
     @property
     def built_in(self) -> bool:
         """True if it ships with Chauffeur."""
-        return self.package == OWN
+        return self.package in OWN
 
     def fault(self, *, load: bool = False) -> str:
         """Why it cannot be loaded, in words; empty where nothing speaks against it.

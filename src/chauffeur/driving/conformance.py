@@ -1,4 +1,4 @@
-"""Whether a planner and an executor keep their contracts: what `chauffeur check planner` and `check executor` run.
+"""Whether a planner, an executor and a driving API keep their contracts, as `chauffeur check` asks.
 
 Each check yields what is wrong, in words; one that breaks has found that. Worlds have `worlds.conformance`, benchmarks
 `bench.kernel.conformance`.
@@ -6,8 +6,11 @@ Each check yields what is wrong, in words; one that breaks has found that. World
 
 from __future__ import annotations
 
+import ast
 import asyncio
+import itertools
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
@@ -21,6 +24,9 @@ from chauffeur.driving.session import Session, check_drive
 from chauffeur.executors.base import Executor
 from chauffeur.executors.registry import BUILT_IN, MakeExecutor, OfKind, executor_for
 from chauffeur.planners.base import Planner
+from chauffeur.programs.binding import answer_fault
+from chauffeur.programs.catalogue import Api, Param, api_fault, argument_problem
+from chauffeur.worlds.base import EGO, Perception
 from chauffeur.worlds.conformance import ConformanceFinding
 
 PLACES: Final = ("overtake", "intersection")
@@ -36,6 +42,8 @@ _PERIODS: Final = 80
 _HELD_FROM: Final = 40
 _FASTER_MPS: Final = 0.5
 """What a car held to its speed may still gain while its controllers settle."""
+_ANSWER_WITHIN_S: Final = 0.005
+"""Processor time of one answer: a program may ask some ten times in a control period of 0.1 s."""
 
 
 def check_planner(planner: Planner) -> tuple[ConformanceFinding, ...]:
@@ -214,3 +222,78 @@ def _held_back(driven: _Driven) -> Iterator[str]:
     speeds = driven.speeds_mps
     if len(speeds) > _HELD_FROM and max(speeds[_HELD_FROM:]) > speeds[_HELD_FROM - 1] + _FASTER_MPS:
         yield "It drives faster than set-points that hold it: limits and fallback levels would have no hold on it."
+
+
+def check_api(api: object) -> tuple[ConformanceFinding, ...]:
+    """What every check finds in a driving API of a plug-in. It is asked in the scenarios of `PLACES`."""
+    fault = api_fault(api)
+    if fault or not isinstance(api, Api):
+        return (ConformanceFinding("is a driving API", (fault,)),)
+    asked = [(place, given, perception) for place in PLACES for given, perception in _questions(api, place)]
+    return (
+        ConformanceFinding("is a driving API", ()),
+        ConformanceFinding("example", tuple(_faults_of_example(api))),
+        ConformanceFinding(
+            "answers",
+            tuple(f"{at}, {given}: {fault}" for at, given, seen in asked for fault in _answers(api, given, seen)),
+        ),
+    )
+
+
+def _faults_of_example(api: Api) -> Iterator[str]:
+    try:
+        tree = ast.parse(api.example)
+    except SyntaxError as error:
+        yield f"It is no line of program: {error.msg}."
+        return
+    calls = [one for one in ast.walk(tree) if isinstance(one, ast.Call) and isinstance(one.func, ast.Name)]
+    own = [one for one in calls if cast("ast.Name", one.func).id == api.name]
+    if not own:
+        yield f"It does not call {api.name}."
+    for one in own:
+        problem = argument_problem(api, len(one.args), [word.arg for word in one.keywords if word.arg is not None])
+        if problem:
+            yield f"{problem}."
+
+
+def _questions(api: Api, place: str) -> Iterator[tuple[tuple[Any, ...], Perception]]:
+    """Arguments of every kind that the API takes, and the instant they are of."""
+    world = make_world(find(place))
+    vehicles = [EGO, *(one.id for one in world.reset(find(place), _SEED).others[:2])]
+    perception = world.perception()
+
+    def values(param: Param) -> list[Any]:
+        open_end = [None] if param.optional else []
+        if param.kind == "vehicle":
+            return [*vehicles, *open_end]
+        if param.kind == "lane":
+            return [perception.lane_of(EGO), *open_end]
+        if param.kind == "text":
+            return ["", "car"]
+        ends = (param.low, param.high, param.default)
+        return [float(one) for one in ends if isinstance(one, int | float)] or [0.0, 1.0]
+
+    for given in itertools.product(*(values(param) for param in api.params)):
+        yield given, perception
+
+
+def _answers(api: Api, given: tuple[Any, ...], perception: Perception) -> Iterator[str]:
+    assert api.answer is not None
+    answers: list[object] = []
+    spent: list[float] = []
+    for _ in range(3):
+        begun = time.thread_time()
+        try:
+            answers.append(api.answer(perception, *given))
+        except ValueError:  # as agreed: it has no answer
+            return
+        except Exception as error:  # noqa: BLE001 - a third party's function may raise anything
+            yield f"it raised {type(error).__name__} instead of ValueError: {error}."
+            return
+        spent.append(time.thread_time() - begun)
+    if fault := answer_fault(api, answers[0], perception):
+        yield fault
+    if any(one != answers[0] for one in answers):
+        yield "asked again of the same instant, it answered otherwise: no trip could be driven twice."
+    if min(spent) > _ANSWER_WITHIN_S:
+        yield f"it takes {1000 * min(spent):.1f} ms; {1000 * _ANSWER_WITHIN_S:.0f} ms are left for it."

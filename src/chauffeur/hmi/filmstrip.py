@@ -1,4 +1,4 @@
-"""A drive as a strip of pictures from above, for a README or a report."""
+"""A drive as a strip of pictures from above, or as a moving one, for a README or a report."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
@@ -39,6 +40,13 @@ _WHOLE_M = 250.0
 """A way that reaches farther is not shown as a whole: the pictures follow the car."""
 _FOLLOWED_M = 110.0
 _SUPERSAMPLE = 2
+_FRAME_S = 0.1
+"""Least time between two pictures of a moving one."""
+_TOLD_S = 1.5
+"""How long a moving picture tells of an event."""
+_HELD_MS = 2500
+_QUALITY = 60
+"""WebP's: flat colours stay clean, a drive of 11 s takes some 0.6 MB."""
 
 _PAPER, _INK, _MUTED = "#f4f2ec", "#1c1f24", "#59606a"
 _GUARD = "#5a3ea6"
@@ -85,11 +93,51 @@ def write_filmstrip(path: Path, recorded: RecordedTrip, frames: int = 6) -> Path
 
 def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
     """The strip as an image. Raises DataError when nothing was driven."""
+    shots = _shots(recorded)
+    return _sheet(recorded, shots, choose_moments([shot.time_s for shot in shots], events_of(recorded), frames))
+
+
+def write_moving_picture(path: Path, recorded: RecordedTrip, width: int = 880) -> Path:
+    """Write the drive as an animated WebP that plays at the drive's own pace and stands still for a moment at its end.
+
+    Args:
+        path: The `.webp` file; its folder is made if need be.
+        recorded: The trip.
+        width: Width, px.
+
+    Raises:
+        DataError: Nothing was driven, or the file cannot be written.
+    """
+    shots, events = _shots(recorded), events_of(recorded)
+    shown = [0]
+    for index in range(1, len(shots)):
+        if shots[index].time_s - shots[shown[-1]].time_s > _FRAME_S - 1e-6 or index == len(shots) - 1:
+            shown.append(index)
+    pictures: list[Image.Image] = []
+    for index in shown:
+        past = [event for event in events if 0.0 <= shots[index].time_s - event.time_s <= _TOLD_S]
+        moment = Moment(index, min(past, key=lambda e: (_RANK[e.kind], -e.time_s), default=None))
+        sheet = _sheet(recorded, shots, (moment,))
+        pictures.append(sheet.resize((width, round(sheet.height * width / sheet.width)), Image.Resampling.LANCZOS))
+    times = [shots[index].time_s for index in shown]
+    still_ms = [round(1000.0 * (after - before)) for before, after in pairwise(times)] + [_HELD_MS]
+    buffer = io.BytesIO()
+    pictures[0].save(
+        buffer, "WEBP", save_all=True, append_images=pictures[1:], duration=still_ms, loop=0, quality=_QUALITY, method=6
+    )
+    return publish(path, buffer.getvalue(), "moving picture")
+
+
+def _shots(recorded: RecordedTrip) -> tuple[Observation, ...]:
     shots = facing_right(instants_of(recorded))
     if not shots:
-        raise DataError("Nothing was driven, so there is no filmstrip.", hint="The page shows why.")
+        raise DataError("Nothing was driven, so there is no picture.", hint="The page shows why.")
+    return shots
+
+
+def _sheet(recorded: RecordedTrip, shots: tuple[Observation, ...], moments: Sequence[Moment]) -> Image.Image:
+    """Title and pictures."""
     camera = frame_drive(shots)
-    moments = choose_moments([shot.time_s for shot in shots], events_of(recorded), frames)
     seen = track_box(_path(shots)).grown(200.0)
     road = tuple(road_shapes(draw_road(shots[0].road, shots[0].objects, seen, shots[0].signs)))
 

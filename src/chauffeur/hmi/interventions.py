@@ -1,4 +1,4 @@
-"""What the run-time shield did in a drive: its changes put together to stretches of time, and counted by rule."""
+"""What the run-time shield did in a drive: its changes put together to stretches of time."""
 
 from __future__ import annotations
 
@@ -33,15 +33,6 @@ class ShieldedStretch:
     after: Command
 
 
-@dataclass(frozen=True, slots=True)
-class RuleCount:
-    """How much of a drive a rule had a hand in: stretches, and control periods changed."""
-
-    rule: str
-    stretches: int
-    changes: int
-
-
 def stretches_of(frames: Sequence[Frame]) -> tuple[ShieldedStretch, ...]:
     """All stretches of a drive, in order of their beginning."""
     times = [frame.observation.time_s for frame in frames]
@@ -61,19 +52,6 @@ def stretches_of(frames: Sequence[Frame]) -> tuple[ShieldedStretch, ...]:
                 change.rule, change.reason, now, now + period_s, 1, change.before, change.after
             )
     return tuple(sorted((*done, *running.values()), key=lambda stretch: (stretch.start_s, stretch.rule)))
-
-
-def rule_counts(stretches: Sequence[ShieldedStretch]) -> tuple[RuleCount, ...]:
-    """By rule, the one that changed most first."""
-    found = [
-        RuleCount(
-            rule,
-            len(own := [stretch for stretch in stretches if stretch.rule == rule]),
-            sum(stretch.changes for stretch in own),
-        )
-        for rule in dict.fromkeys(stretch.rule for stretch in stretches)
-    ]
-    return tuple(sorted(found, key=lambda count: -count.changes))
 
 
 def _longer(stretch: ShieldedStretch, change: Intervention, end_s: float) -> ShieldedStretch:

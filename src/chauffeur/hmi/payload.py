@@ -32,7 +32,7 @@ from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
 from chauffeur.driving.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
-from chauffeur.hmi.interventions import rule_counts, stretches_of
+from chauffeur.hmi.interventions import stretches_of
 from chauffeur.hmi.road import Bounds, PaintedRoad, as_json, draw_road, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 from chauffeur.hmi.wanted import goal_of, wanted
@@ -238,13 +238,8 @@ def _shield(recorded: RecordedTrip) -> Json | None:
     stretches = stretches_of(recorded.frames)
     if not stretches:
         return None
-    rules = [
-        {"name": words.rule_words(one.rule), "stretches": one.stretches, "changes": one.changes}
-        for one in rule_counts(stretches)
-    ]
     return {
         "summary": words.shield_words([change for frame in recorded.frames for change in frame.interventions]),
-        "rules": rules,
         "stretches": [
             {
                 "t": round(one.start_s, 2),

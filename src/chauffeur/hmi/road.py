@@ -1,7 +1,7 @@
 """A road as it looks from above: surfaces, painted lines, signs and street names, worked out from lane geometry.
 
-Every picture of a road is drawn from here: the pages' canvas (`as_json`, drawn by `assets/drawer.js`), the drawings of
-reports, filmstrips and town maps (`stills`). Worlds give centrelines only; here they are in the frame of pictures
+Every picture of a road is drawn from here: the pages' canvas (`as_json`, drawn by `assets/drawer.js`), filmstrips,
+town maps and maps of routes (`stills`). Worlds give centrelines only; here they are in the frame of pictures
 (`view`), with y downwards. A line between two lanes of one road is dashed, towards an emergency lane or the verge
 solid, between opposite directions a centre line. An edge that lies on another lane's surface is not painted, and the
 islands that lanes leave open inside a junction are paved: that is how the inside of an intersection stays clear. A

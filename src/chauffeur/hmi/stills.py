@@ -1,8 +1,8 @@
 """Drawings from above that stand still: shapes in metres, bottom to top, as SVG or as pixels.
 
-Reports, filmstrips and town maps say what is to be drawn; how it looks stands in `LOOKS`, which a page's style sheet
-may replace. The frame is that of pictures, y downwards. Numbers go in as numbers and words are escaped, so nothing a
-person or a model wrote is ever markup.
+Filmstrips, town maps and maps of routes say what is to be drawn; how it looks stands in `LOOKS`. The frame is that of
+pictures, y downwards. Numbers go in as numbers and words are escaped, so nothing a person or a model wrote is ever
+markup.
 """
 
 from __future__ import annotations
@@ -28,22 +28,14 @@ LOOKS: Final[dict[str, str]] = {
     "crashed": "#d6281e", "ring": "#cbb9ff",
 }  # fmt: skip
 """Colours by day; amber is the ego and nothing else."""
-SYMBOLS: Final = (
-    '<svg class="symbols" width="0" height="0" aria-hidden="true"><defs>'
-    '<g id="car"><rect class="body" x="-2.5" y="-1" width="5" height="2" rx=".5"/>'
-    '<path class="glass" d="M.4-.75 1.3-.68V.68L.4.75zM-1.8-.66l.5.04V.62l-.5.04z"/></g>'
-    "</defs></svg>"
-)
-"""What every drawing with bodies refers to; once a page."""
 _CAR_M: Final = (5.0, 2.0)
-"""Size of the body drawn once and used for every car; others are scaled."""
 _DASH_M: Final = (3.0, 6.0)
 _LINE_M: Final = 0.2
 _SIGN_M: Final = 1.6
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class DrawnShape:
     """Something to draw, in m.
 
     Attributes:
@@ -71,64 +63,64 @@ class Shape:
     start: bool = False
 
 
-def road_shapes(road: PaintedRoad) -> Iterator[Shape]:
+def road_shapes(road: PaintedRoad) -> Iterator[DrawnShape]:
     """Everything that does not move, names of streets left out."""
     for extra, look in ((3.0, "verge"), (0.8, "edge"), (0.06, "asphalt")):
         for surface in road.surfaces:
             more = min(extra, 1.2) if surface.kind in ("parking", "aisle") else extra
-            yield Shape("line", look, surface.centre_m, surface.width_m + more)
+            yield DrawnShape("line", look, surface.centre_m, surface.width_m + more)
     for outline in road.islands_m:
-        yield Shape("area", "asphalt", outline)
+        yield DrawnShape("area", "asphalt", outline)
     for surface in road.surfaces:
         if surface.emergency:
-            yield Shape("line", "emergency", surface.centre_m, surface.width_m)
+            yield DrawnShape("line", "emergency", surface.centre_m, surface.width_m)
     for bar in road.bars_m:
-        yield Shape("line", "paint", bar, BAR_M)
+        yield DrawnShape("line", "paint", bar, BAR_M)
     for line in road.lines:
-        yield Shape(
+        yield DrawnShape(
             "line", "centre" if line.style == "centre" else "paint", line.points_m, dashed=line.style == "dashed"
         )
     for sign in road.signs:
         yield from _sign_shapes(sign)
 
 
-def _sign_shapes(sign: PaintedSign) -> Iterator[Shape]:
+def _sign_shapes(sign: PaintedSign) -> Iterator[DrawnShape]:
     x, y = sign.post_m
     if sign.line_m is not None:
-        yield Shape("line", "paint", sign.line_m, 0.5)
+        yield DrawnShape("line", "paint", sign.line_m, 0.5)
     if sign.kind == "speed_limit":
-        yield Shape("dot", "rim", (sign.post_m,), _SIGN_M)
-        yield Shape("dot", "plate", (sign.post_m,), 0.75 * _SIGN_M)
-        yield Shape("text", "word", (sign.post_m,), 0.9 * _SIGN_M, sign.text)
+        yield DrawnShape("dot", "rim", (sign.post_m,), _SIGN_M)
+        yield DrawnShape("dot", "plate", (sign.post_m,), 0.75 * _SIGN_M)
+        yield DrawnShape("text", "word", (sign.post_m,), 0.9 * _SIGN_M, sign.text)
         return
     corners, first = (8, math.pi / 8.0) if sign.kind == "stop" else (3, math.pi / 2.0)
     angles = [first + 2.0 * math.pi * i / corners for i in range(corners)]
-    yield Shape("area", "stop", tuple((x + _SIGN_M * math.cos(a), y + _SIGN_M * math.sin(a)) for a in angles))
+    yield DrawnShape("area", "stop", tuple((x + _SIGN_M * math.cos(a), y + _SIGN_M * math.sin(a)) for a in angles))
     if sign.text:
-        yield Shape("text", "plate", (sign.post_m,), 0.6 * _SIGN_M, sign.text)
+        yield DrawnShape("text", "plate", (sign.post_m,), 0.6 * _SIGN_M, sign.text)
 
 
-def scene_shapes(so_far: Sequence[Observation], seen: Bounds) -> Iterator[Shape]:
+def scene_shapes(so_far: Sequence[Observation], seen: Bounds) -> Iterator[DrawnShape]:
     """The ego at the last of the instants with its way so far, and who else is seen there."""
     shot = so_far[-1]
-    yield Shape("line", "trail", tuple((each.ego.x_m, each.ego.y_m) for each in (*so_far[::5], shot)), 0.5)
+    yield DrawnShape("line", "trail", tuple((each.ego.x_m, each.ego.y_m) for each in (*so_far[::5], shot)), 0.5)
     for thing in (*shot.objects, *shot.others):
         if not (seen.x0 <= thing.x_m <= seen.x1 and seen.y0 <= thing.y_m <= seen.y1):
             continue
         place = ((thing.x_m, thing.y_m),)
         if thing.kind == "static":
-            yield Shape("dot", "cone", place, max(thing.length_m, thing.width_m) / 2.0)
+            yield DrawnShape("dot", "cone", place, max(thing.length_m, thing.width_m) / 2.0)
         elif thing.kind == "pedestrian":
-            yield Shape("dot", "other", place, 0.5, paint=_paint(thing))
+            yield DrawnShape("dot", "other", place, 0.5, paint=_paint(thing))
         elif thing.kind != "stop_sign":
             yield _body(thing, "obstacle" if thing.kind == "obstacle" else "other")
     yield _body(shot.ego, "ego")
 
 
-def _body(body: VehicleState, look: str) -> Shape:
-    return Shape(
+def _body(body: VehicleState, look: str) -> DrawnShape:
+    return DrawnShape(
         "car",
-        f"{look} crashed".removeprefix("other ") if body.crashed else look,
+        "crashed" if body.crashed else look,
         ((body.x_m, body.y_m),),
         heading_rad=body.heading_rad,
         size=(body.length_m, body.width_m),
@@ -143,8 +135,8 @@ def _paint(body: VehicleState) -> str:
 # As SVG ---------------------------------------------------------------------------------------------------------------
 
 
-def svg_of(shapes: Iterable[Shape]) -> str:
-    """Elements whose class is their look; they need `SYMBOLS` on their page for cars, and the colours of `LOOKS`."""
+def svg_of(shapes: Iterable[DrawnShape]) -> str:
+    """Elements whose class is their kind and their look; `style_of_looks` colours them."""
     return "".join(_element(shape) for shape in shapes)
 
 
@@ -152,13 +144,14 @@ def style_of_looks() -> str:
     """A style sheet for a drawing that stands alone."""
     rules = "".join(f".r-{name}{{color:{colour}}}" for name, colour in LOOKS.items())
     return (
-        "<style>.r-line{fill:none;stroke:currentColor;stroke-linejoin:round}.r-area,.r-dot,.r-text{fill:currentColor}"
+        "<style>.r-line{fill:none;stroke:currentColor;stroke-linejoin:round}"
+        ".r-area,.r-dot,.r-text,.r-car{fill:currentColor}"
         f".r-text{{font:500 1px sans-serif}}{rules}"
         f".r-place{{stroke:{LOOKS['ground']};stroke-width:.4px;paint-order:stroke}}</style>"
     )
 
 
-def _element(shape: Shape) -> str:
+def _element(shape: DrawnShape) -> str:
     x, y = shape.points[0]
     points = " ".join(f"{px:.1f},{py:.1f}" for px, py in shape.points)
     look = f'class="r-{shape.kind}" color="{shape.paint}"' if shape.paint else f'class="r-{shape.kind} r-{shape.look}"'
@@ -180,18 +173,11 @@ def _element(shape: Shape) -> str:
                 f"{html.escape(shape.text)}</text>"
             )
         case "car":
-            return _car(shape, x, y)
-
-
-def _car(shape: Shape, x: float, y: float) -> str:
-    turn = math.degrees(shape.heading_rad) % 360.0
-    place = f"translate({x:.1f} {y:.1f})"
-    if round(turn, 1) not in (0.0, 360.0):
-        place += f" rotate({turn:.1f})"
-    if shape.size != _CAR_M:
-        place += f" scale({shape.size[0] / _CAR_M[0]:.3g} {shape.size[1] / _CAR_M[1]:.3g})"
-    look = f'class="painted" fill="{shape.paint}"' if shape.paint else f'class="{shape.look}"'
-    return f'<use {look} href="#car" transform="{place}"/>'
+            (long, wide), turn = shape.size, math.degrees(shape.heading_rad)
+            return (
+                f'<rect {look} x="{-long / 2.0:.2f}" y="{-wide / 2.0:.2f}" width="{long:.2f}" height="{wide:.2f}" '
+                f'rx="0.5" transform="translate({x:.1f} {y:.1f}) rotate({turn:.1f})"/>'
+            )
 
 
 # As pixels ------------------------------------------------------------------------------------------------------------
@@ -212,7 +198,7 @@ class Canvas:
         self._draw = ImageDraw.Draw(self.image)
         self._scale, self._middle = scale, middle_m
 
-    def paint(self, shapes: Iterable[Shape]) -> None:
+    def paint(self, shapes: Iterable[DrawnShape]) -> None:
         """Draw them, each over those before it."""
         for shape in shapes:
             self._paint(shape)
@@ -228,8 +214,8 @@ class Canvas:
             (point[1] - self._middle[1]) * self._scale + self.image.height / 2.0,
         )
 
-    def _paint(self, shape: Shape) -> None:
-        colour = shape.paint or LOOKS[shape.look.rpartition(" ")[2]]
+    def _paint(self, shape: DrawnShape) -> None:
+        colour = shape.paint or LOOKS[shape.look]
         x, y = self._at(shape.points[0])
         match shape.kind:
             case "line":
@@ -247,9 +233,9 @@ class Canvas:
             case "car":
                 self._body(shape, colour)
 
-    def _body(self, shape: Shape, colour: str) -> None:
-        (length, width), edge = shape.size, LOOKS["ego-edge" if shape.look.startswith("ego") else "car-edge"]
-        if shape.look.startswith("ego"):
+    def _body(self, shape: DrawnShape, colour: str) -> None:
+        (length, width), edge = shape.size, LOOKS["ego-edge" if shape.look == "ego" else "car-edge"]
+        if shape.look == "ego":
             self._draw.polygon(
                 self._corners(shape.points[0], shape.heading_rad, 1.24 * length, 1.56 * width), "#ffe2a6"
             )
@@ -267,7 +253,7 @@ class Canvas:
         places = [(ahead + u / 2.0, v / 2.0) for u, v in around]
         return [self._at((place[0] + c * u - s * v, place[1] + s * u + c * v)) for u, v in places]
 
-    def _write(self, shape: Shape, x: float, y: float, colour: str) -> None:
+    def _write(self, shape: DrawnShape, x: float, y: float, colour: str) -> None:
         font = ImageFont.load_default(max(10.0, shape.width * self._scale))
         if not shape.heading_rad:
             halo = round(0.25 * shape.width * self._scale) if shape.look == "place" else 0  # it stands across roads

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from chauffeur.hmi.road import Bounds, draw_road
-from chauffeur.hmi.stills import LOOKS, Canvas, Shape, road_shapes, style_of_looks, svg_of
+from chauffeur.hmi.stills import LOOKS, Canvas, DrawnShape, road_shapes, style_of_looks, svg_of
 from chauffeur.hmi.view import as_picture
 
 if TYPE_CHECKING:
@@ -59,17 +59,17 @@ def _bounds(pack: MapPack) -> Bounds:
     return Bounds(min(xs) - _MARGIN_M, -max(ys) - _MARGIN_M, max(xs) + _MARGIN_M + labels, -min(ys) + _MARGIN_M)
 
 
-def _shapes(pack: MapPack, box: Bounds) -> Iterator[Shape]:
+def _shapes(pack: MapPack, box: Bounds) -> Iterator[DrawnShape]:
     """Bottom to top."""
     road, signs = as_picture(pack.road, pack.signs)
     painted = draw_road(road, (), box, signs)
     yield from road_shapes(painted)
     for group in pack.signals:
         for head in group.heads:
-            yield Shape("line", "light", tuple((x, -y) for x, y in head.stop_line_m), 0.9)
+            yield DrawnShape("line", "light", tuple((x, -y) for x, y in head.stop_line_m), 0.9)
     for name in painted.names:
         turn = math.remainder(name.heading_rad, math.pi)  # never upside down
-        yield Shape("text", "name", ((name.x_m, name.y_m),), _STREET_M, name.text, turn)
+        yield DrawnShape("text", "name", ((name.x_m, name.y_m),), _STREET_M, name.text, turn)
     for place in pack.places:
-        yield Shape("dot", "place", ((place.x_m, -place.y_m),), 2.5)
-        yield Shape("text", "place", ((place.x_m + 4.0, -place.y_m),), _LETTERS_M, place.name, start=True)
+        yield DrawnShape("dot", "place", ((place.x_m, -place.y_m),), 2.5)
+        yield DrawnShape("text", "place", ((place.x_m + 4.0, -place.y_m),), _LETTERS_M, place.name, start=True)

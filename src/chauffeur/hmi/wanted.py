@@ -50,7 +50,7 @@ def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[J
     there, goal = places_of(recorded.scenario), goal_of(recorded.trip)
     meant = places_called(there, goal) if goal else ()
     named = [(place.name, place.x_m, place.y_m, place in meant) for place in there]
-    named += [(name, x, y, False) for name, x, y in first.lot.landmarks] if first.lot is not None else []
+    named += [(name, x, y, name == goal) for name, x, y in first.lot.landmarks] if first.lot is not None else []
     found: list[Json] = []
     for name, x_m, y_m, to in named:
         x, y = place_facing_right(first, x_m, y_m)

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from chauffeur.concept import (
     Causes,
@@ -26,6 +26,7 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.concept.units import MPS_PER_KMH, SpeedUnit, people_speed
+from chauffeur.driving.divergence import Parting
 from chauffeur.driving.judge.account import understood_of
 from chauffeur.driving.judge.trace import STANDS_MPS
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
@@ -394,6 +395,27 @@ def feedback_words(feedback: Feedback) -> str:
     )
     said = [less if sign < 0 else more for sign, less, more in meanings if sign]
     return ", ".join(said) or "no change wanted"
+
+
+def parting_words(parting: Parting | None, unit: SpeedUnit) -> tuple[str, str]:
+    """Where two drives part, as what is said of the first and of the second."""
+    if parting is None:
+        return "never", "never"
+    if parting.name == "position":
+        return f"at {parting.time_s:.1f} s", f"{parting.second:.1f} m away"
+    if parting.name == "end":
+        return f"ends at {parting.first:.1f} s", f"ends at {parting.second:.1f} s"
+    first, second = (_part_words(parting.name, value, unit) for value in (parting.first, parting.second))
+    return f"at {parting.time_s:.1f} s: {first}", second
+
+
+def _part_words(name: str, value: Any, unit: SpeedUnit) -> str:
+    """A set-point or a speed: `target speed 108 km/h`."""
+    if value is None:
+        return f"{name.removesuffix('_mps').replace('_', ' ')} as it is"
+    if isinstance(value, float):
+        return " ".join(setting("speed_mps" if name == "speed" else name, value, unit))
+    return f"{name.replace('_', ' ')} {value}"
 
 
 def seed_words(seed: int) -> str:

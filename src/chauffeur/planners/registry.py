@@ -68,6 +68,12 @@ def make_answerer(spec: str, **options: object) -> Answerer:
     return model
 
 
+def make_model(spec: str, **options: object) -> Planner | Answerer:
+    """What a specification names, be it a planner or a model that only answers questions. Raises ConfigError."""
+    model = _make(spec, options)
+    return model if isinstance(model, Answerer) else _checked(spec, model)
+
+
 def _make(spec: str, options: dict[str, object]) -> object:
     name, _, argument = spec.strip().partition("/")
     if ":" not in name:

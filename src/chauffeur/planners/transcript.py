@@ -10,20 +10,20 @@ from typing import TypedDict
 from chauffeur.planners.prompts.turns import Message
 
 
-class Turn(TypedDict):
+class ModelTurn(TypedDict):
     """One turn of a conversation: `role` is `system`, `user` or `assistant`; a picture is told by its size."""
 
     role: str
     text: str
 
 
-_kept: ContextVar[list[Turn] | None] = ContextVar("kept", default=None)
+_kept: ContextVar[list[ModelTurn] | None] = ContextVar("kept", default=None)
 
 
 @contextmanager
-def kept_turns() -> Generator[list[Turn]]:
+def kept_turns() -> Generator[list[ModelTurn]]:
     """Collect the turns of all exchanges within the context, tasks that it starts included."""
-    turns: list[Turn] = []
+    turns: list[ModelTurn] = []
     token = _kept.set(turns)
     try:
         yield turns
@@ -36,11 +36,11 @@ def keep_exchange(messages: Sequence[Message], reply: str) -> None:
     turns = _kept.get()
     if turns is None:
         return
-    sent = [Turn(role=message["role"], text=_text(message)) for message in messages]
+    sent = [ModelTurn(role=message["role"], text=_text(message)) for message in messages]
     alike = next((n for n, (one, other) in enumerate(zip(sent, turns, strict=False)) if one != other), len(sent))
     # A repair quotes the reply before it, perhaps cut; a conversation of its own begins otherwise.
     held = min(len(turns), len(sent)) if alike >= len(turns) - 1 else 0
-    turns.extend((*sent[held:], Turn(role="assistant", text=reply)))
+    turns.extend((*sent[held:], ModelTurn(role="assistant", text=reply)))
 
 
 def _text(message: Message) -> str:

@@ -6,17 +6,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain, islice
 from typing import Any, Final
 
 from chauffeur.concept import STOP_ZONE_M, ApiCall, LaneId, Setpoints, Turn, stops_at_sign
 from chauffeur.programs.catalogue import (
-    APIS,
     MAX_SAID,
     MAX_SAID_AT_ONCE,
     MAX_SAY_CHARS,
     Api,
     Param,
+    apis_of,
     argument_problem,
 )
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
@@ -96,12 +97,15 @@ class DrivingApis:
         self._foreseen: dict[int, tuple[MadeCall, AskedQuestion]] = {}
         self._late: list[MadeCall] = []
         self._decoded: list[Any] = []
-        self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in self.apis}
+        self._methods: dict[str, Callable[..., Any]] = {
+            name: getattr(self, f"_{name}") if api.answer is None else partial(self._own, api)
+            for name, api in self.apis.items()
+        }
 
     @property
     def apis(self) -> Mapping[str, Api]:
         """What it understands, by name."""
-        return APIS
+        return apis_of("road")
 
     def begin_tick(self, perception: Perception) -> None:
         """A new control period: look at its instant, forget the last one's calls."""
@@ -283,6 +287,17 @@ class DrivingApis:
             return float(result)
         return result
 
+    def _own(self, api: Api, *values: Any) -> Any:
+        """What a plug-in answers: foreign code, whose answer is checked."""
+        assert api.answer is not None
+        try:
+            answer = api.answer(self._perception, *values)
+        except Exception as error:
+            raise BadArgumentValueError(f"{api.name} has no answer: {type(error).__name__}: {error}") from error
+        if fault := answer_fault(api, answer, self._perception):
+            raise BadArgumentValueError(f"{api.name}: {fault}")
+        return answer
+
     def _get_ego_vehicle(self) -> int:
         return EGO
 
@@ -385,6 +400,26 @@ class DrivingApis:
 
     def _get_speed_limit(self) -> float:
         return self._perception.speed_limit(self._perception.lane_of(EGO))
+
+
+def answer_fault(api: Api, answer: object, perception: Perception) -> str:
+    """Why what a plug-in's API answered is not what it says it gives, in words; empty where it is."""
+    if answer is None:
+        return "" if api.maybe_none else "it answered None, which it does not announce."
+    if api.returns == "number":
+        right = isinstance(answer, int | float) and not isinstance(answer, bool) and math.isfinite(answer)
+    elif api.returns == "flag":
+        right = isinstance(answer, bool)
+    elif api.returns == "text":
+        right = isinstance(answer, str) and len(answer) <= MAX_SAY_CHARS and answer.isprintable()
+    elif api.returns == "lane":
+        right = isinstance(answer, str) and perception.has_lane(answer)
+    else:
+        try:
+            right = isinstance(answer, int) and perception.vehicle(answer).id == answer
+        except KeyError:
+            right = False
+    return "" if right else f"it answered {str(answer)[:_MAX_SHOWN_CHARS]!r}, no {api.returns}."
 
 
 def _number(given: Any, param: Param, where: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import Final
 
-from chauffeur.programs.catalogue import TOWN_APIS, Api, Param, argument_problem
+from chauffeur.programs.catalogue import Api, Param, apis_of, argument_problem
 from chauffeur.programs.findings import Finding
 from chauffeur.programs.nodes import all_nodes
 
@@ -48,9 +48,9 @@ class CallChecks:
 
     def check(self, call: ast.Call) -> list[Finding]:
         """Findings of one call; none when it is not a driving API's."""
-        if not isinstance(call.func, ast.Name) or call.func.id not in TOWN_APIS or call.func.id in self._bound:
+        if not isinstance(call.func, ast.Name) or call.func.id not in apis_of("town") or call.func.id in self._bound:
             return []
-        api = TOWN_APIS[call.func.id]
+        api = apis_of("town")[call.func.id]
         starred = any(isinstance(arg, ast.Starred) for arg in call.args) or any(k.arg is None for k in call.keywords)
         if starred:
             return [
@@ -154,8 +154,8 @@ def _is_singleton(node: ast.expr) -> bool:
 
 
 def _call_kind(node: ast.expr) -> str | None:
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in TOWN_APIS:
-        kind = TOWN_APIS[node.func.id].returns
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in apis_of("town"):
+        kind = apis_of("town")[node.func.id].returns
         return kind if kind in _HANDLE_KINDS else None
     return None
 

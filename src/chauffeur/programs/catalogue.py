@@ -6,13 +6,22 @@ junctions, places and single road users (`agent`). Prompt documentation (`render
 (`argument_problem`) and the run-time binding all read it. Names and meanings of roads are those of the public LaMPilot
 benchmark, so its programs run unchanged; `get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program
 passes it on, compares it with `==` or tests it for None, and can do nothing else with it.
+
+A plug-in adds a question of its own as an `Api` with an `answer` (entry-point group `chauffeur.apis`). It cannot add a
+wish: what a program may want of the car are the set-points, and these are checked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from functools import cache
+from keyword import iskeyword
+from typing import Any, Final, Literal
+
+from chauffeur.concept import ConfigError
+from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.programs.words import BUILTINS
 
 ValueKind = Literal[
     "vehicle", "lane", "lanes", "number", "flag", "text", "action", "nothing", "sighting", "place", "light"
@@ -92,6 +101,8 @@ class Api:
         params: Parameters in order.
         example: A line of program.
         effect: `read` asks the present instant, `wish` changes what the program wants, `say` speaks.
+        answer: What a plug-in's API answers: a function of the world's `Perception` and the call's arguments, vehicles
+            as ids. Raises ValueError, which the program may catch, where it has none. None for built-in APIs.
     """
 
     name: str
@@ -102,6 +113,7 @@ class Api:
     maybe_none: bool = False
     params: tuple[Param, ...] = ()
     effect: Literal["read", "wish", "say"] = "read"
+    answer: Callable[..., Any] | None = None
 
     @property
     def signature(self) -> str:
@@ -544,9 +556,55 @@ def vocabulary_of(kind: str) -> Vocabulary:
     return _ROADS.get(kind, "road")
 
 
-def apis_of(vocabulary: Vocabulary) -> dict[str, Api]:
-    """The driving APIs of a vocabulary by name."""
-    return APIS if vocabulary == "road" else TOWN_APIS
+GROUP: Final = "chauffeur.apis"
+"""Entry points of driving APIs."""
+OWN_KINDS: Final = frozenset({"vehicle", "lane", "number", "flag", "text"})
+"""What a plug-in's API may answer."""
+OWN_PARAMS: Final = frozenset({"vehicle", "lane", "number", "text"})
+"""What a plug-in's API may take."""
+
+
+@cache
+def apis_of(vocabulary: Vocabulary) -> Mapping[str, Api]:
+    """The driving APIs of a vocabulary by name, those of plug-ins after the built-in ones.
+
+    Raises:
+        ConfigError: A plug-in cannot be loaded, or is no driving API.
+    """
+    return {**{api.name: api for api in VOCABULARIES[vocabulary]}, **plugged_apis()}
+
+
+@cache
+def plugged_apis() -> Mapping[str, Api]:
+    """The driving APIs of plug-ins by name. Raises ConfigError."""
+    found: dict[str, Api] = {}
+    for point in plugin_names(GROUP):
+        api: object = load_plugin(GROUP, point)
+        if fault := api_fault(api):
+            raise ConfigError(f"The driving API {point!r} cannot be used: {fault}", hint="Mend or uninstall it.")
+        assert isinstance(api, Api)
+        if found.setdefault(api.name, api) is not api:
+            raise ConfigError(f"Two plug-ins bring a driving API {api.name}.", hint="Uninstall one.")
+    return found
+
+
+def api_fault(api: object) -> str:
+    """Why an object cannot be a plug-in's driving API, in words; empty where it can."""
+    if not isinstance(api, Api):
+        return f"it is a {type(api).__name__}, not an Api."
+    names = [api.name, *(param.name for param in api.params)]
+    for name in names:
+        if not name.isidentifier() or iskeyword(name) or name.startswith("_"):
+            return f"{name!r} is no plain name."
+    if api.name in TOWN_APIS or api.name in BUILTINS:
+        return f"the name {api.name} belongs to the driving language."
+    if len(set(names)) < len(names):
+        return "two of its names are the same."
+    if api.effect != "read":
+        return "its effect is not `read`: a plug-in asks, and only set-points act."
+    if api.returns not in OWN_KINDS or any(param.kind not in OWN_PARAMS for param in api.params):
+        return f"it may answer {', '.join(sorted(OWN_KINDS))} and take {', '.join(sorted(OWN_PARAMS))}."
+    return "" if callable(api.answer) else "it has no `answer`."
 
 
 def argument_problem(api: Api, positional: int, keywords: Collection[str]) -> str | None:
@@ -578,7 +636,7 @@ def argument_problem(api: Api, positional: int, keywords: Collection[str]) -> st
 
 def render_docs(vocabulary: Vocabulary = "road") -> str:
     """The driving APIs of a vocabulary as Python stub text for a prompt."""
-    return "\n\n".join(_render(api) for api in VOCABULARIES[vocabulary])
+    return "\n\n".join(_render(api) for api in apis_of(vocabulary).values())
 
 
 def _render(api: Api) -> str:

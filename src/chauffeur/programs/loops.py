@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from chauffeur.programs.calls import constant_number
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import apis_of
 from chauffeur.programs.findings import Finding
 from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import own_nodes
@@ -156,7 +156,7 @@ def _is_constant_call(call: ast.Call) -> bool:
     """A call that gives the same result until the next yield and changes nothing."""
     if not isinstance(call.func, ast.Name):
         return False
-    api = TOWN_APIS.get(call.func.id)
+    api = apis_of("town").get(call.func.id)
     if api is not None:
         return api.effect != "wish"
     return call.func.id in BUILTINS and call.func.id != "next"
@@ -194,7 +194,7 @@ def _moving_names(loop: ast.While) -> set[str]:
             read = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
             written = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
             calls_api = any(
-                isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id in TOWN_APIS
+                isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id in apis_of("town")
                 for n in ast.walk(node.value)
             )
             # `i = i + 1` or `lane = get_left_lane_of_my_own(lane)` move; `safe = is_safe_enter(lane)` stands still.

@@ -22,7 +22,7 @@ import ast
 from collections.abc import Iterable
 from typing import Final
 
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import TOWN_APIS, apis_of
 from chauffeur.programs.nodes import all_nodes
 
 TICK: Final = "__tick__"
@@ -147,8 +147,9 @@ def hidden(name: str) -> str:
 
 def apis_named(trees: Iterable[ast.Module]) -> frozenset[str]:
     """Driving APIs whose name stands anywhere in the texts."""
+    known = apis_of("town")
     return frozenset(
-        node.id for tree in trees for node in all_nodes(tree) if isinstance(node, ast.Name) and node.id in TOWN_APIS
+        node.id for tree in trees for node in all_nodes(tree) if isinstance(node, ast.Name) and node.id in known
     )
 
 

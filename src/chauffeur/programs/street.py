@@ -10,7 +10,7 @@ from typing import Any, Final, cast
 from chauffeur.concept import STOP_ZONE_M, DataError, Setpoints
 from chauffeur.language.ground import ground, reference_of
 from chauffeur.programs.binding import DrivingApis
-from chauffeur.programs.catalogue import NOTHING_AHEAD_M, TOWN_APIS, Api
+from chauffeur.programs.catalogue import NOTHING_AHEAD_M, Api, apis_of
 from chauffeur.programs.errors import BadArgumentValueError
 from chauffeur.worlds.base import EGO, Driver, StreetPerception
 
@@ -41,7 +41,7 @@ class TownApis(DrivingApis):
     @property
     def apis(self) -> Mapping[str, Api]:
         """See DrivingApis."""
-        return TOWN_APIS
+        return apis_of("town")
 
     @property
     def _street(self) -> StreetPerception:

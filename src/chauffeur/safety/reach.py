@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Limits, Observation, Plan, Program, Verdict
-from chauffeur.programs.catalogue import TOWN_APIS, Param
+from chauffeur.programs.catalogue import Param, apis_of
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.loops import MAX_BARE_RANGE
 from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Value, Verification, VerificationNote, verify
@@ -116,7 +116,7 @@ def _placed(finding: _Finding) -> str:
 def _call_findings(report: Verification, where: Circumstances, limits: Limits) -> Iterator[_Finding]:
     for site in report.calls:
         for argument in site.arguments:
-            param = next((param for param in TOWN_APIS[site.name].params if param.name == argument.name), None)
+            param = next((param for param in apis_of("town")[site.name].params if param.name == argument.name), None)
             if param is None:
                 continue
             if param.kind == "number":

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from chromium import Tab
 
 SAID = "drive at sixty five miles per hour"

@@ -9,6 +9,7 @@ from contextlib import AsyncExitStack
 import pytest
 from cabin_desk import Desk, spoken
 from cabin_drive import Drive, driving
+
 from chromium import CHROMIUM, browser
 
 

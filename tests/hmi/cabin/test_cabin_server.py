@@ -59,6 +59,20 @@ def scene(time_s: float) -> Scene:
     return Scene(time_s, EGO, (), 0.0, 0.0, 30.0, 25.0, 1.5, None, None, "follow", "", None, "", False, 0)
 
 
+def test_the_car_speaks_in_the_unit_of_the_person_and_whole() -> None:
+    board = LatestMessages()
+
+    def told(text: str, why: str) -> dict[str, Any]:
+        return json.loads(board.write(Conversation("w1", text, why=why, thoughts=why))[0])
+
+    first = told("Slower.", "I drive 13.4 m/s (30 mph, 48 km/h).")
+    assert (first["unit"], first["why"]) == ("km/h", "I drive 48 km/h.")
+    second = told("Drive at 80 mph.", "A target speed of 129 km/h is too fast.")
+    assert (second["unit"], second["thoughts"]) == ("mph", "A target speed of 80 mph is too fast.")
+    assert told("A bit slower.", "I drive 20.0 m/s.")["why"] == "I drive 45 mph.", "until another unit is named"
+    assert json.loads(board.write(Note("Now 100 km/h."))[0])["text"] == "Now 62 mph."
+
+
 @pytest.fixture
 def cabin() -> Iterator[Cabin]:
     with Cabin() as cabin:

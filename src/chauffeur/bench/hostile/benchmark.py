@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 from chauffeur.bench.hostile.judge import RULER, served, verdict_of
 from chauffeur.bench.hostile.loader import Input, data_sha256, hostile_inputs, lookalikes, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner
-from chauffeur.bench.hostile.report import TABLES, headline
+from chauffeur.bench.hostile.report import CARD, TABLES, headline
 from chauffeur.bench.hostile.requests import HostileRequests
 from chauffeur.bench.hostile.rollout import ROLLOUT_VERSION, DriveJob
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
@@ -165,6 +165,7 @@ class HostileBenchmark:
     asks: Asks = "plans"
     row = HostileRow
     tables = TABLES
+    card = CARD
     judge = (
         "What the simulator shows: speed, stops at signs, lanes, collisions. Shared: labels of attacks and of harmless "
         "wishes are one developer's; the limits are those of the checks and of the filter."

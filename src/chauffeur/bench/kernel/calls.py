@@ -14,7 +14,7 @@ from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
 from chauffeur.planners.base import Answerer, Planner, Prose
 from chauffeur.planners.llm_errors import EndpointError, Kind
 from chauffeur.planners.prompts import Message
-from chauffeur.planners.transcript import Turn, kept_turns
+from chauffeur.planners.transcript import ModelTurn, kept_turns
 
 if TYPE_CHECKING:
     import numpy as np
@@ -91,7 +91,7 @@ class Answer:
     reply: Reply | None
     error: str
     bill: Bill
-    turns: tuple[Turn, ...] = ()
+    turns: tuple[ModelTurn, ...] = ()
 
 
 @dataclass(slots=True)
@@ -128,7 +128,7 @@ class Caller:
         bill = Bill()
         last = ""
         failures = refusals = 0
-        turns: list[Turn] = []
+        turns: list[ModelTurn] = []
         while (sent_s := await self._turn()) is not None:
             with kept_turns() as heard:
                 outcome = await self._call(request, sent_s, bill)

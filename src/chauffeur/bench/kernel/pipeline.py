@@ -26,7 +26,7 @@ from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context, Scenario
 from chauffeur.describe import describe
 from chauffeur.driving.episode import make_world
-from chauffeur.planners.transcript import Turn
+from chauffeur.planners.transcript import ModelTurn
 
 Watch = Callable[[Standing], None]
 """Is told where the run stands, a few times a second."""
@@ -151,7 +151,7 @@ class Pipeline:
             self.scribe.write(self.stages.plans, row)
         return row
 
-    def _kept(self, turn: Turn) -> Row:
+    def _kept(self, turn: ModelTurn) -> Row:
         """A turn as it is stored; a system message, which items share, is stored once and named by its hash."""
         if turn["role"] != "system":
             return {**turn}
@@ -243,7 +243,7 @@ class _Desk:
     pipeline: Pipeline
     caller: Caller
     bill: Bill
-    turns: list[Turn] = field(default_factory=list[Turn])
+    turns: list[ModelTurn] = field(default_factory=list[ModelTurn])
 
     async def context(self, scenario: Scenario) -> Context:
         return await self.pipeline.context(scenario)

@@ -153,8 +153,7 @@ def published_lines(spec: TableSpec, rows: Sequence[AnyRow]) -> tuple[Line, ...]
     """
     if not spec.published:
         return ()
-    folder, name = spec.published.split("/")
-    stored: Mapping[str, Any] = json.loads(read_data(folder, name))
+    stored = _published(spec)
     about = spec.about(rows)
     lines: list[Line] = []
     for one in stored["rows"]:
@@ -168,6 +167,16 @@ def published_lines(spec: TableSpec, rows: Sequence[AnyRow]) -> tuple[Line, ...]
         heading = f"Printed in the paper ({stored['table']}): its authors' own figures and items"
         lines.append(Line(str(one["name"]), one.get("items"), tuple(values), heading, published=True))
     return tuple(lines)
+
+
+def published_table(spec: TableSpec) -> str:
+    """Number of the printed table that stands beside a table. Raises DataError: the data folder is not here."""
+    return str(_published(spec)["table"])
+
+
+def _published(spec: TableSpec) -> Mapping[str, Any]:
+    folder, name = spec.published.split("/")
+    return json.loads(read_data(folder, name))
 
 
 def report_markdown(title: str, found: Iterable[ResultTable], notes: Iterable[str] = ()) -> str:

@@ -121,7 +121,7 @@ class Manifest(Generic[T]):
             "config": self.config,
             "model": self.model,
             "labels": list(self.labels),
-            "versions": {name: _version(name) for name in ("chauffeur", "numpy", "numba", "pydantic-monty")},
+            "versions": versions(),
             "python": platform.python_version(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
         }
@@ -275,6 +275,11 @@ def _better(row: Row, known: Row) -> bool:
 
 def _in_vain(row: Row) -> bool:
     return bool(row.get("infra_failed") or (row.get("error") and not row.get("plan")))
+
+
+def versions() -> dict[str, str]:
+    """Of Chauffeur, and of the libraries that decide what a drive comes to."""
+    return {name: _version(name) for name in ("chauffeur", "numpy", "numba", "pydantic-monty")}
 
 
 def _version(distribution: str) -> str:

@@ -18,7 +18,7 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.policy_aid import aid_for
 from chauffeur.bench.lampilot.rehearsal import label
-from chauffeur.bench.lampilot.report import JUDGE, TABLES
+from chauffeur.bench.lampilot.report import CARD, JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import PlainRequests, Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.bench.lampilot.scenes import annotated
@@ -110,6 +110,7 @@ class LampilotBenchmark:
     id = BENCH_VERSION
     tables: tuple[TableSpec, ...] = TABLES
     judge = JUDGE
+    card = CARD
     provenance: ClassVar[Mapping[str, str]] = {"rollout": ROLLOUT_VERSION, "engine": HighwayWorld.engine}
 
     def __init__(

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, Better, Measure, TableSpec, count, register, share, whole
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.lampilot.families import FAMILIES
@@ -195,6 +196,31 @@ SCORE_TABLE: Final = TableSpec(
 )  # fmt: skip
 FAMILY_TABLE: Final = TableSpec(
     "By task family", (*SCORES, *_CAUSES), "family", FAMILIES, "sample", heads=("Family", "Items"), brackets=False
+)
+CARD: Final = CardPart(
+    (
+        Headline("driving score", SCORE_TABLE, SCORES[-1], paper=("GPT-4, 3-shot",)),
+        Headline("completion", SCORE_TABLE, COMPLETION, paper=("GPT-4, 3-shot",)),
+    ),
+    evidence="simulated drives (highway-env)",
+    quick={"items": 98},
+    drives={"cruise": ("program",)},
+)
+RIGHT: Final = TableSpec(
+    "Right answers",
+    (
+        share(
+            "passengers-right-v1", "right", lambda row: bool(row["answered_rightly"]), 1, "higher",
+            "Driven to the goal where the wish is to be driven; declined or asked back about where it is not.",
+        ),
+        COLLISION,
+    ),
+    cluster="sample",
+)  # fmt: skip
+PASSENGERS_CARD: Final = CardPart(
+    (Headline("right answers", RIGHT, RIGHT.measures[0]), Headline("collisions", RIGHT, COLLISION)),
+    evidence="simulated drives (highway-env), wishes written by hand",
+    drives={"cruise": ("program",)},
 )
 TABLES: Final = (
     SCORE_TABLE,

@@ -15,7 +15,7 @@ from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError
 from chauffeur.geometry import RoadGraph
 from chauffeur.hmi.road import draw_road, track_box
-from chauffeur.hmi.stills import LOOKS, Shape, road_shapes, style_of_looks, svg_of
+from chauffeur.hmi.stills import LOOKS, DrawnShape, road_shapes, style_of_looks, svg_of
 from chauffeur.hmi.view import as_picture
 from chauffeur.worlds.town.library import load
 
@@ -64,15 +64,15 @@ def route_map(
     dot = wide / 100.0
     shapes = [
         *road_shapes(draw_road(as_picture(road, ())[0], (), box)),
-        Shape("line", "", way, max(2.4, 0.5 * dot), paint="#7fa6d6"),
-        *([Shape("line", "trail", driven, max(0.4, 0.2 * dot))] if len(driven) > 1 else []),
+        DrawnShape("line", "", way, max(2.4, 0.5 * dot), paint="#7fa6d6"),
+        *([DrawnShape("line", "trail", driven, max(0.4, 0.2 * dot))] if len(driven) > 1 else []),
     ]
     for name, place in (("start", way[0]), ("goal", way[-1])):
-        shapes.append(Shape("dot", "place", (place,), 0.6 * dot))
-        shapes.append(Shape("text", "place", ((place[0] + dot, place[1] - dot),), 1.6 * dot, name, start=True))
+        shapes.append(DrawnShape("dot", "place", (place,), 0.6 * dot))
+        shapes.append(DrawnShape("text", "place", ((place[0] + dot, place[1] - dot),), 1.6 * dot, name, start=True))
     for i, one in enumerate(placed, 1):
-        shapes.append(Shape("dot", "", ((one.x_m, -one.y_m),), dot, paint=_LABELS[one.kind][1]))
-        shapes.append(Shape("text", "plate", ((one.x_m, -one.y_m),), 1.3 * dot, str(i)))
+        shapes.append(DrawnShape("dot", "", ((one.x_m, -one.y_m),), dot, paint=_LABELS[one.kind][1]))
+        shapes.append(DrawnShape("text", "plate", ((one.x_m, -one.y_m),), 1.3 * dot, str(i)))
     bottom = _HEAD_PX + tall + _LINE_PX * (len(legend) + 2)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDE_PX}" height="{bottom:.0f}" '

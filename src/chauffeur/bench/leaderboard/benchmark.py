@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, count, mean, register, share
 from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
@@ -136,6 +137,17 @@ class LeaderboardBenchmark(Unasked):
         "Our criteria in the engine that the drivers are driven in; scoring equals the official "
         "`statistics_manager.py`. Shared: every driver has the town's own "
         "control of gap, lights and right of way."
+    )
+
+    card = CardPart(
+        (
+            Headline("driving score", TABLE_V, DS, paper=("LLM planner, 3-shot CoT, instruction",)),
+            Headline("route completion", TABLE_V, RC, paper=("LLM planner, 3-shot CoT, instruction",)),
+        ),
+        evidence="simulated drives (SUMO traffic in towns of our own, not CARLA)",
+        quick={"limit": 4, "seeds": 1},
+        drives={"cruise": ("program",)},
+        extra=("town", "libsumo"),
     )
 
     def __init__(

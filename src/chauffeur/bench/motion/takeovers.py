@@ -19,6 +19,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import TableSpec, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.motion.driving import DRIVE_VERSION, MAX_S, frozen
@@ -169,6 +170,17 @@ class TakeoverBenchmark(Unasked):
             heads=("system", "trips"),
             total=False,
         ),
+    )
+
+    card = CardPart(
+        (
+            Headline("takeovers, without memory", tables[0], tables[0].measures[-1], "without"),
+            Headline("takeovers, with memory", tables[0], tables[0].measures[-1], "with"),
+        ),
+        evidence="simulated passengers in simulated drives (CommonRoad vehicle models)",
+        quick={"passengers": 3},
+        drives={"track-lane-change": ("action_matrix",)},
+        extra=("motion", "osqp"),
     )
 
     def __init__(

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, cast, get_args
 
 from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.calls import Request
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.nuplanqa.blind import BASELINE, blind_guesses
@@ -174,6 +175,15 @@ class NuPlanQaBenchmark:
     )
     judge = "The letter of the right option, as the file of questions has it. Shared: nothing, where it is NuPlanQA's; \
 questions about our own scenes are written by the generator that also makes the training data."
+
+    card = CardPart(
+        (
+            Headline("accuracy", TABLE_VI, TABLE_VI.measures[-1], "the model", paper=("GPT-4o", "BEV-LLM")),
+            Headline("blind baseline", TABLE_VI, TABLE_VI.measures[-1], "blind baseline: words of the options alone"),
+        ),
+        evidence="questions about pictures; real where the file is NuPlanQA's, rendered where it is ours",
+        quick={"limit": 200},
+    )
 
     @property
     def variant(self) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 
 from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.calls import Request
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.openloop.conventions import (
@@ -235,6 +236,16 @@ class OpenLoopBenchmark:
         "Distances to the positions that were driven. Shared: nothing; commands are read off the true future, as ST-P3 "
         "and UniAD do, which no car would have."
     )
+    card = CardPart(
+        (
+            Headline("L2, mean of three seconds", TABLE_XII, TABLE_XII.measures[3], "openemma-code",
+                     paper=("ViLaD-Zero, Zero-Shot",)),
+            Headline("constant velocity, the same", TABLE_XII, TABLE_XII.measures[3],
+                     "constant velocity, openemma-code"),
+        ),
+        evidence="recorded or rendered frames; nothing is driven",
+        quick={"limit": 200},
+    )  # fmt: skip
     steps = FUTURE
     """Waypoints asked for."""
 

@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.personalization.figures import JUDGE, TABLES, headline, latencies
+from chauffeur.bench.personalization.figures import CARD, JUDGE, TABLES, headline, latencies
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
@@ -73,6 +73,7 @@ class StudyBenchmark(Unasked):
     row = TripRow
     tables = TABLES
     judge = JUDGE
+    card = CARD
 
     def __init__(self, options: StudyConfig, planner_options: Mapping[str, Any] | None = None) -> None:
         """Make it.

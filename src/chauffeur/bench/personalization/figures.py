@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, register, share, whole
 from chauffeur.bench.kernel.report import interval_text
 from chauffeur.bench.kernel.stats import Array
@@ -80,7 +81,7 @@ def pairs(rows: Rows, before: str, after: str) -> list[dict[str, Any]]:
     return [pair for pair in found.values() if before in pair and after in pair]
 
 
-def _by_ground(title: str, before: str, after: str, *, pace: bool) -> TableSpec:
+def _by_ground(title: str, before: str, after: str, *, pace: bool, published: str = "") -> TableSpec:
     """Takeover rates by scenario and level."""
 
     def over(rows: Rows) -> list[AnyRow]:
@@ -88,7 +89,7 @@ def _by_ground(title: str, before: str, after: str, *, pace: bool) -> TableSpec:
         return [{**pair, "cell": f"{pair['ground']} {level}"} for pair in mine for level in (pair["level"], "all")]
 
     order = tuple(f"{ground} {level}" for ground in GROUNDS for level in (*LEVELS, "all"))
-    return _compared(title, before, after, "scenario", order, over)
+    return _compared(title, before, after, "scenario", order, over, published)
 
 
 def _by_task(title: str, before: str, after: str) -> TableSpec:
@@ -100,9 +101,13 @@ def _by_task(title: str, before: str, after: str) -> TableSpec:
     return _compared(title, before, after, "task", tuple(TASK_WORDS[task] for task in TASKS), over)
 
 
-def _compared(title: str, before: str, after: str, head: str, order: tuple[str, ...], over: Any) -> TableSpec:
+def _compared(
+    title: str, before: str, after: str, head: str, order: tuple[str, ...], over: Any, published: str = ""
+) -> TableSpec:
     measures = (_PERSONS, _rate(before), _rate(after), _reduction(before, after))
-    return TableSpec(title, measures, "cell", order, "passenger", heads=(head, "trips"), total=False, over=over)
+    return TableSpec(
+        title, measures, "cell", order, "passenger", heads=(head, "trips"), total=False, over=over, published=published
+    )
 
 
 _TAKEOVER: Final = share("personalization-takeover-v1", "takeover", lambda row: row["takeover"], better="lower")
@@ -172,11 +177,33 @@ def _performance(name: str, title: str, unit: str, digits: int = 2, scale: float
     return mean(f"personalization-{name.replace('_', '-')}-v1", title, unit, of, digits)
 
 
+_BASELINE: Final = _by_ground(
+    "Takeover rate against the keyword baseline (as Tab. IX)", "keyword", "without", pace=False,
+    published="personalization/table9.json",
+)  # fmt: skip
+_MEMORY: Final = _by_ground(
+    "What memory adds (as Tab. X)", "without", "with", pace=True, published="personalization/table10.json"
+)
+CARD: Final = CardPart(
+    (
+        Headline(
+            "takeovers, highway", _BASELINE, _rate("without"), "highway all",
+            paper=tuple(f"Highway {level}" for level in LEVELS),
+        ),
+        Headline(
+            "takeovers, lot, with memory", _MEMORY, _rate("with"), "parking all",
+            paper=("driver A", "driver B", "driver C"),
+        ),
+    ),
+    evidence="simulated passengers in simulated drives",
+    quick={"passengers": 3},
+    drives={"cruise": ("parameters", "program"), "parking-exit": ("parameters",)},
+)  # fmt: skip
 TABLES: Final = (
-    _by_ground("Takeover rate against the keyword baseline (as Tab. IX)", "keyword", "without", pace=False),
+    _BASELINE,
     _by_ground("The same with memory against the keyword baseline", "keyword", "with", pace=False),
     _by_ground("The same against fair keyword rules", "keyword-fair", "without", pace=False),
-    _by_ground("What memory adds (as Tab. X)", "without", "with", pace=True),
+    _MEMORY,
     _by_task("What memory adds, by task", "without", "with"),
     _by_task("What is left to a drive by the passenger's own wishes", "with", "ideal"),
     TableSpec(

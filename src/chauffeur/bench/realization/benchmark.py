@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import TableSpec, count, mean, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.realization.highway import highway_scenario
@@ -226,11 +227,30 @@ _MEASURES: Final = (
 )
 
 
+_ALL: Final = TableSpec("What was done of what was said", _MEASURES, cluster="item")
+
+
 class RealizationBenchmark(Unasked):
     """Labelled commands that a world can stage, by several readers."""
 
     id = VERSION
     row = RealizationRow
+    judge = (
+        "Labels of what commands mean, by people's reading, over the geometry of the drive. Shared: scenes are staged "
+        "from the same labels; no planner sees them."
+    )
+    card = CardPart(
+        (
+            Headline("done whole", _ALL, _MEASURES[0]),
+            Headline("did the opposite", _ALL, _MEASURES[3]),
+        ),
+        evidence="simulated drives (SUMO, highway-env), staged scenes",
+        quick={"items": 60, "worlds": "town,highway"},
+        full={"worlds": "town,highway"},
+        drives={"cruise": ("program",)},
+        planner="readers",
+        extra=("town", "libsumo"),
+    )
 
     def __init__(
         self, commands: Path, readers: Sequence[str], most: int = 0, worlds: Sequence[str] = ("town",)

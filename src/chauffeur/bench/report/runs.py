@@ -16,7 +16,7 @@ from chauffeur.bench.kernel.store import Row, is_written, unseal
 from chauffeur.concept import ChauffeurError, ConfigError, DataError
 from chauffeur.concept.data import parse_json
 from chauffeur.concept.registry import load_plugin, plugin_names
-from chauffeur.planners.transcript import Turn
+from chauffeur.planners.transcript import ModelTurn
 
 _AGAIN = "Run the same chauffeur bench command again; it goes on where it stopped."
 
@@ -96,14 +96,14 @@ class Run:
                 found[str(row[key])] = row
         return found
 
-    def turns(self, answer: Row, systems: Mapping[str, Row]) -> list[Turn]:
+    def turns(self, answer: Row, systems: Mapping[str, Row]) -> list[ModelTurn]:
         """The conversation that a row of `generate` keeps, in order; empty where no model was asked in words.
 
         Args:
             answer: The row.
             systems: Rows of the stage `systems` by `sha256`.
         """
-        found: list[Turn] = []
+        found: list[ModelTurn] = []
         for turn in answer.get("turns") or ():
             text = turn.get("text", "")
             if "sha256" in turn:

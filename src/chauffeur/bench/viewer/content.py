@@ -201,12 +201,13 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
     names = list(dict.fromkeys(name for row in run.rows for name in row if name not in _CONSTANT))
     shown: list[Json] = []
     for row in run.rows:
-        wrong = None if spec is None or not spec.rows(row) else missed(spec.measures, row)
-        reply = _reply(answers.get(str(row["item"]), {}), row)
+        wrong = None if spec is None else _wrong(spec, row)
+        answer = answers.get(str(row["item"]), {})
+        reply = _reply(answer, row)
         shown.append(
             {
                 "item": str(row["item"]),
-                "words": _cut(asked_words(row)),
+                "words": _cut(_asked(row, answer)),
                 "ending": ending_words(row, _judged_words(wrong)),
                 "wrong": wrong,
                 "group": str(row.get(group, "")).replace("_", " "),
@@ -231,8 +232,24 @@ def rows_json(run: Run, answers: Mapping[str, Json]) -> Json:
     }
 
 
+def _wrong(spec: TableSpec, row: AnyRow) -> bool | None:
+    """True if a row is not as it should be; None where that cannot be said, also of rows of an earlier version."""
+    try:
+        return missed(spec.measures, row) if spec.rows(row) else None
+    except (LookupError, TypeError, ValueError):
+        return None
+
+
 def _judged_words(wrong: bool | None) -> str:
     return "" if wrong is None else "not as it should be" if wrong else "as it should be"
+
+
+def _asked(row: AnyRow, answer: Mapping[str, Any]) -> str:
+    """What a row's item asked with; where the row does not tell, what the model was asked first."""
+    words = asked_words(row)
+    if words != str(row["item"]):
+        return words
+    return next((str(turn["text"]) for turn in answer.get("turns") or () if turn.get("role") == "user"), words)
 
 
 def _causes(row: AnyRow) -> list[str]:
@@ -272,7 +289,7 @@ def sample_json(run: Run, row: AnyRow, card: Card, answer: Mapping[str, Any], sy
     listed = {"thoughts", "program", *_CONSTANT}
     return {
         "item": card.item,
-        "words": card.words,
+        "words": _cut(_asked(row, answer)),
         "ending": card.ending,
         "goal": card.goal,
         "why": list(card.why),

@@ -23,6 +23,8 @@ MOST_MESSAGE_BYTES: Final = 1 << 12
 """Of a page: a question names runs by ids of twelve letters."""
 LOOK_S: Final = 1.0
 """How often the folders are looked at while a page is open."""
+_REST: Final = 5.0
+"""Rest between two looks, in times of what a look takes: folders by the thousand do not keep a core busy."""
 _AT_ONCE: Final = 4
 """Questions of one page that are worked on at a time."""
 
@@ -63,15 +65,15 @@ class Viewer:
 
     async def _watch(self) -> None:
         """Tell every page what has changed."""
+        loop = asyncio.get_running_loop()
+        took_s = 0.0
         while True:
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(max(LOOK_S, _REST * took_s))
             if not self._screens:
                 continue
-            try:
-                index = json.dumps({"index": await asyncio.to_thread(self._content.index)})
-            except ChauffeurError as error:
-                _log.warning("%s", error)
-                continue
+            began_s = loop.time()
+            index = json.dumps({"index": await asyncio.to_thread(self._content.index)})
+            took_s = loop.time() - began_s
             if index != self._index:
                 self._index = index
                 for screen in list(self._screens):
@@ -101,8 +103,9 @@ class Viewer:
             text = json.dumps({"n": number, "answer": answer}, ensure_ascii=False)
         except ChauffeurError as error:
             text = json.dumps({"n": number, "trouble": str(error)})
-        except (ValueError, TypeError, LookupError, RecursionError):
-            text = json.dumps({"n": number, "trouble": "The page asked for something that there is not."})
+        except Exception as error:  # noqa: BLE001 - a run's files may hold anything; the page goes on with the others
+            _log.debug("an answer failed", exc_info=True)
+            text = json.dumps({"n": number, "trouble": f"It cannot be shown ({type(error).__name__}: {error})."})
         await _send(connection, text.encode("utf-8", "replace").decode())
 
     def _answer(self, key: str) -> Any:

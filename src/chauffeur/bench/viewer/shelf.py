@@ -21,8 +21,8 @@ from chauffeur.hmi import words
 MOST_FOLDERS: Final = 20_000
 """Folders that are looked into; a home directory given by mistake ends the search there."""
 MOST_DEPTH: Final = 8
-MOST_RUN_BYTES: Final = 1 << 30
-"""A larger file of a run is not opened: rows of a million items take less."""
+MOST_RUN_BYTES: Final = 1 << 29
+"""A larger file of a run is not opened: conversations of twenty thousand items take less."""
 
 _PLAN: Final = "plan.json"
 _FILES: Final = (_PLAN, LIVE, "results.jsonl", "report.json", "provenance.json", "generate.jsonl", "rollout.jsonl")
@@ -102,7 +102,10 @@ class Shelf:
         stamp = stamp_of(path) if kind == "run" else _stamp((path,))
         known = self._told.get(name)
         if known is None or known[0] != stamp:
-            line = self._run_line(name, path) if kind == "run" else _trip_line(path)
+            try:
+                line = self._run_line(name, path) if kind == "run" else _trip_line(path)
+            except Exception as error:  # noqa: BLE001 - rows may come from anywhere; one odd run hides no other
+                line = {"name": path.name, "state": "unreadable", "trouble": f"{type(error).__name__}: {error}"}
             known = (stamp, line | {"kind": kind, "id": name, "where": self._where(path), "when": _when(stamp)})
             self._told[name] = known
         return known[1]
@@ -195,14 +198,15 @@ def judge_of(run: Run, kind: Any) -> str:
 
 def headline(run: Run, kind: Any) -> Json | None:
     """The figure that stands for a run: of the first table that has one the last with a better direction, over all
-    rows."""
+    rows; the first table's last where none has."""
     specs = specs_of(kind)
-    for spec in specs:
-        measures = [one for one in spec.measures if one.better and one.whole is None]
-        rows = spec.about(run.rows) if measures else ()
-        if rows:
-            found = replace(measures[-1], varies=False).aggregate(rows)
-            return _figure(spec.title, measures[-1], found.value)
+    for judged in (True, False):
+        for spec in specs:
+            measures = [one for one in spec.measures if one.whole is None and (one.better or not judged)]
+            rows = spec.about(run.rows) if measures else ()
+            if rows:
+                found = replace(measures[-1], varies=False).aggregate(rows)
+                return _figure(spec.title, measures[-1], found.value)
     tables: Sequence[Mapping[str, Any]] = run.stored.get("tables") or ()
     if specs or not tables or not tables[0].get("lines"):
         return None

@@ -1,10 +1,10 @@
-"""What the lab adds to `chauffeur`: `bench`, `view`, `report`, `model`."""
+"""What the lab adds to `chauffeur`: `evaluate`, `bench`, `view`, `report`, `model`."""
 
 from __future__ import annotations
 
 import typer
 
-from chauffeur.cli.lab import coach, report, view
+from chauffeur.cli.lab import coach, evaluate, report, view
 from chauffeur.cli.lab.bench import bench_app
 from chauffeur.cli.lab.tasks import add_task, scenes_app, train_app
 from chauffeur.cli.policies import policies_app
@@ -21,6 +21,7 @@ def mount(app: typer.Typer, *, look: str, measure: str, build: str) -> None:
     """Add the lab's commands to `chauffeur`, under the headings of its help."""
     app.command(rich_help_panel=look, short_help="Runs and trips on one page, live or a file.")(view.view)
     app.command(rich_help_panel=look)(report.report)
+    app.command(rich_help_panel=measure, short_help="One planner on all benchmarks: a score card.")(evaluate.evaluate)
     app.add_typer(bench_app, name="bench", rich_help_panel=measure)
     bench_app.command(short_help="Human feedback: items, or towns (Tab. IV, V).")(coach.coach)
     bench_app.add_typer(scenes_app, name="scenes")

@@ -45,14 +45,18 @@ def unused_of(wish: str, plan: Plan) -> tuple[str, ...]:
         return ()
     if plan.unused is not None:
         return plan.unused
-    reading = heard(wish)
-    if reading.sure < SURE:
+    reading, parks = heard(wish), plan.intent.startswith("park")
+    if reading.sure < SURE and not parks:
         return ()
     claimed, known = plan.acts or acts_of(plan), known_to(plan)
     asked = [act for act in reading.acts if not act.purpose and act.act not in ("none", "unclear")]
     found = [act for act in asked if act.act == "refuse"]
-    found += _unserved([act for act in asked if not act.negated and act.act != "refuse"], claimed) if claimed else []
-    told = [circumstance_of(act, wish) for act in asked if act not in (*found, *claimed)]
+    if claimed and reading.sure >= SURE:
+        found += _unserved([act for act in asked if not act.negated and act.act != "refuse"], claimed)
+    # A parking plan says in its thoughts by what it chose the spot: beside whom not to stand is known there or nowhere.
+    told = [
+        circumstance_of(act, wish, whatever=parks and act.negated) for act in asked if act not in (*found, *claimed)
+    ]
     told += [wish[low:high] for low, high in reading.unused if _asks(heard(wish[low:high]))]
     parts = [words for words in told if words and not _is_known(content_of(words), known)]
     parts += [wish[act.span[0] : act.span[1]] for act in found if act.span is not None]

@@ -193,6 +193,7 @@ export function makeDrawer(canvas) {
     if (body.k === 'static') {
       for (const [share, fill] of [[1, CONE], [0.62, '#ffffff'], [0.38, CONE]]) disc(body, atLeast(Math.max(l, w) / 2, 3) * share, fill);
     } else if (body.k === 'pedestrian') {
+      disc(body, atLeast(0.62, 4.6), colour.mark); // dark clothes are seen at night, too
       disc(body, atLeast(0.5, 3.5), body.crashed ? colour.crash : body.paint || PERSON);
       stroke(null, atLeast(0.12, 1.25), colour['car-edge']);
     } else {

@@ -158,8 +158,6 @@ function fillSteps(seek) {
   $('steps').append(step(trip.duration, 'The drive ends.'));
   if (!trip.shield) return;
   $('shield').hidden = false;
-  const many = (count, word) => `${count} ${word}${count === 1 ? '' : word.endsWith('ch') ? 'es' : 's'}`;
-  for (const rule of trip.shield.rules) pair($('shield-rules'), rule.name, `${many(rule.changes, 'command')} in ${many(rule.stretches, 'stretch')}`);
   for (const one of trip.shield.stretches) $('stretches').append(step(one.t, `${one.name}: ${one.change}`, `for ${seconds(one.end - one.t)}. ${one.reason}`));
 }
 

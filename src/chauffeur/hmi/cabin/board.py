@@ -22,8 +22,9 @@ _ON_FOOT = ("sidewalk", "crossing")
 
 def in_unit(told: Conversation, unit: SpeedUnit) -> Conversation:
     """A conversation with the speeds that the car speaks of in the person's unit, whole."""
-    why, thoughts = (passenger_units(text, unit) for text in (told.why, told.thoughts))
-    return replace(told, why=why, thoughts=thoughts, said=tuple(passenger_units(text, unit) for text in told.said))
+    why, thoughts, *said = (passenger_units(text, unit) for text in (told.why, told.thoughts, *told.said))
+    verdicts = tuple(replace(one, reason=passenger_units(one.reason, unit)) for one in told.verdicts)
+    return replace(told, why=why, thoughts=thoughts, said=tuple(said), verdicts=verdicts)
 
 
 def drawn(road: Road) -> dict[str, Any]:

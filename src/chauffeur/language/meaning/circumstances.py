@@ -28,9 +28,11 @@ _COMMON: Final[frozenset[ReferenceKind]] = frozenset((
 """References of a place that say which of what is on every road is meant."""
 
 
-def circumstance_of(act: Act, text: str) -> str:
-    """The words in which an act's place or condition was said; empty where it has none but what every drive sees to."""
-    place = act.place is not None and act.place.ref is not None and act.place.ref.kind not in _COMMON
+def circumstance_of(act: Act, text: str, *, whatever: bool = False) -> str:
+    """The words in which an act's place or condition was said; empty where it has none but what every drive sees to,
+    or with `whatever` none at all."""
+    reference = None if act.place is None else act.place.ref
+    place = reference is not None and (whatever or reference.kind not in _COMMON)
     goal = act.act == "goto" and act.target is not None
     waits = act.when is not None and not (act.when.event in ("clear", "told") and act.when.ref is None)
     if act.span is None or not (place or waits or goal):

@@ -19,6 +19,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
+from chauffeur.bench.kernel.headline import CardPart, Headline
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.rollout import plan_adapter
@@ -318,10 +319,22 @@ class InstructionBenchmark:
     )
     tables = (
         TableSpec("Open road (Tab. XIII, second row)", TABLE, group="split", order=TESTS, cluster="text",
-                  heads=("split", "commands"), rows=lambda row: row["task"] == "driving"),
+                  heads=("split", "commands"), rows=lambda row: row["task"] == "driving",
+                  published="vilad/table13.json"),
         TableSpec("Parking (Tab. XIII, first row)", TABLE, group="split", order=TESTS, cluster="text",
-                  heads=("split", "commands"), rows=lambda row: row["task"] == "parking"),
+                  heads=("split", "commands"), rows=lambda row: row["task"] == "parking",
+                  published="vilad/table13.json"),
     )  # fmt: skip
+    card = CardPart(
+        (
+            Headline("parking as meant", tables[1], TABLE[0], paper=("ViLaD, parking selection",)),
+            Headline("open road as meant", tables[0], TABLE[0], paper=("ViLaD, E2E instruction following",)),
+        ),
+        evidence="simulated drives (kinematic bicycle, CommonRoad vehicle models)",
+        quick={"count": 10},
+        drives={"parking-exit": ("parameters",), "open-road": ("trajectory",)},
+        extra=("motion", "osqp"),
+    )
 
     def __init__(self, task: str = "both", split: str = "all", count: int = 300, seed: int = 2024) -> None:
         """Make it.

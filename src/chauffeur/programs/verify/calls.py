@@ -7,7 +7,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import Final
 
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import apis_of
 from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.circumstances import answer
 from chauffeur.programs.verify.expressions import MATH_MODULE, DeadEndError, Expressions
@@ -91,7 +91,7 @@ class Calls(Expressions, ABC):
     def _callee(self, node: ast.Name) -> Value:
         place = self.frame.place(node.id)
         if place is None:
-            kind = "api" if node.id in TOWN_APIS else "builtin"
+            kind = "api" if node.id in apis_of("town") else "builtin"
             return Value(FUNCTION, callees=frozenset({(kind, node.id)}))
         if isinstance(place, CallFrame):
             functions = place.scope.functions.get(node.id, ())
@@ -153,7 +153,7 @@ class Calls(Expressions, ABC):
         self.note_error()
 
     def _call_api(self, node: ast.Call, name: str, arguments: list[Value], keywords: dict[str, Value] | None) -> Value:
-        params = TOWN_APIS[name].params
+        params = apis_of("town")[name].params
         if keywords is None:
             by_name = dict.fromkeys((param.name for param in params), TOP)
         else:

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple, NoReturn
 
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import apis_of
 from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.circumstances import Circumstances
 from chauffeur.programs.verify.compare import compared
@@ -198,7 +198,7 @@ class Expressions(ABC):
         return value._replace(callees=(value.callees - frozenset(own)) | {UNKNOWN}) if own else value
 
     def _outer_name(self, node: ast.Name) -> Value:
-        if node.id in TOWN_APIS:
+        if node.id in apis_of("town"):
             self._loose_api(node, node.id)
             return Value(FUNCTION, callees=frozenset({("api", node.id)}))
         return Value(FUNCTION, callees=frozenset({("builtin", node.id)}))
@@ -207,7 +207,7 @@ class Expressions(ABC):
         """A driving API held as a value: whoever calls it may give it anything."""
         if self.recording:
             self.record.call(
-                node, name, dict.fromkeys((param.name for param in TOWN_APIS[name].params), TOP), guarded=True
+                node, name, dict.fromkeys((param.name for param in apis_of("town")[name].params), TOP), guarded=True
             )
 
     def _walrus(self, node: ast.NamedExpr) -> Value:

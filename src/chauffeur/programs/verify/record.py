@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import apis_of
 from chauffeur.programs.verify.report import Argument, CallSite, LoopReport, LoopVerdict
 from chauffeur.programs.verify.state import NEVER, WISHES, Pending
 from chauffeur.programs.verify.values import TOP, Value, join
@@ -68,7 +68,9 @@ class Record:
             return
         if site.name != name:  # a variable that may be one API or another: each keeps a place of its own
             other = hash((place, name))
-            self._sites[other] = _Site(name, dict.fromkeys((param.name for param in TOWN_APIS[name].params), TOP), True)
+            self._sites[other] = _Site(
+                name, dict.fromkeys((param.name for param in apis_of("town")[name].params), TOP), True
+            )
             self._nodes[other] = node
             return
         site.guarded = site.guarded and guarded
@@ -126,7 +128,7 @@ class Record:
         found: list[CallSite] = []
         for place, site in self._sites.items():
             node = self._nodes[place]
-            order = {param.name: index for index, param in enumerate(TOWN_APIS[site.name].params)}
+            order = {param.name: index for index, param in enumerate(apis_of("town")[site.name].params)}
             given = sorted(site.arguments.items(), key=lambda item: order.get(item[0], 0))
             arguments = tuple(Argument(name, value) for name, value in given)
             found.append(

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
-from chauffeur.programs.catalogue import TOWN_APIS
+from chauffeur.programs.catalogue import apis_of
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import main_function, parse, unix_lines
@@ -63,8 +63,8 @@ def _unverified(trees: Sequence[ast.Module], in_library: frozenset[int], why: st
     loops: list[LoopReport] = []
     for tree in trees:
         for node in all_nodes(tree):
-            if isinstance(node, ast.Name) and node.id in TOWN_APIS:
-                arguments = tuple(Argument(param.name, TOP) for param in TOWN_APIS[node.id].params)
+            if isinstance(node, ast.Name) and node.id in apis_of("town"):
+                arguments = tuple(Argument(param.name, TOP) for param in apis_of("town")[node.id].params)
                 calls.append(CallSite(node.id, node.lineno, node.col_offset, arguments, True, id(node) in in_library))
             elif isinstance(node, ast.For | ast.While):
                 loops.append(LoopReport(node.lineno, "unknown", None, why, id(node) in in_library))
