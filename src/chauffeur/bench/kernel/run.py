@@ -263,12 +263,17 @@ def score(folder: Path, stages: StageStore[Any]) -> list[Row]:
     files = {
         "results.jsonl": "".join(line + "\n" for line in lines),
         "table.md": report_markdown(benchmark.id, filled, notes),
-        "report.json": _json(told),
-        "provenance.json": _json(manifest.provenance(getattr(benchmark, "provenance", {}))),
+        "report.json": as_json(told),
+        "provenance.json": as_json(manifest.provenance(getattr(benchmark, "provenance", {}))),
     }
+    write_results(folder, files)
+    return rows
+
+
+def write_results(folder: Path, files: Mapping[str, str]) -> None:
+    """Write what came of a run. Raises DataError when it cannot be written."""
     for name, text in files.items():
         publish(folder / name, text.encode("utf-8", "replace"), "run's result")
-    return rows
 
 
 def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
@@ -277,7 +282,8 @@ def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
     return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
 
 
-def _json(value: Any) -> str:
+def as_json(value: Any) -> str:
+    """A file's text."""
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -28,7 +28,7 @@ UNFINISHED: Final = 3
 """Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
 
 
-def _effort(given: Mapping[str, Any]) -> Effort:
+def effort(given: Mapping[str, Any]) -> Effort:
     """How hard a run works. Raises ConfigError for options that contradict each other."""
     from functools import partial
 
@@ -75,7 +75,7 @@ def run_named(name: str, make: Any, options: Mapping[str, Any], given: Mapping[s
     from chauffeur.cli.console import stdout
     from chauffeur.cli.lab.bench_progress import shown
 
-    console, work = stdout(), _effort(given)
+    console, work = stdout(), effort(given)
     part = WHOLE if given["shard"] is None else Shard.parse(given["shard"], os.environ)
     bench = benchmark_from(make, name, **options)
     planner = given.get("planner") or ("onboard" if bench.asks == "plans" else None)
