@@ -50,8 +50,8 @@ def evaluate(
     if compare is not None:
         show_comparison(console, *compare)
         return
-    given = {"workers": workers, "concurrency": concurrency, "max_usd": max_usd, "max_requests": max_requests}
-    work = effort({**given, "price": price, "ray": None})
+    asking = {"concurrency": concurrency, "max_usd": max_usd, "max_requests": max_requests, "price": price}
+    work = effort({"workers": workers, "ray": None, **asking})
     who = Evaluated.of(planner, base_url or "", **planner_options(planner, None))
     name = planner.replace("/", "-").replace(":", "-")
     folder = out or Path("runs") / f"evaluate-{name}-{profile}"
