@@ -6,11 +6,13 @@ import os
 import pty
 import re
 import select
+import signal
 import subprocess
 import termios
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 WITHIN_S: Final = 180.0
@@ -48,6 +50,9 @@ def at_a_terminal(command: Sequence[str]) -> Iterator[tuple[subprocess.Popen[byt
         stdout=theirs,
         stderr=theirs,
         env=os.environ | {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"},
+        preexec_fn=partial(
+            signal.signal, signal.SIGINT, signal.SIG_DFL
+        ),  # Ctrl-C, also where tests run in the background
     )
     try:
         yield process, ours

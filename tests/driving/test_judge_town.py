@@ -263,7 +263,8 @@ def test_the_judge_shares_nothing_with_what_drives() -> None:
     own = {node.module for node in nodes if node.module is not None and node.module.startswith("chauffeur")}
     assert own
     allowed = ("chauffeur.concept", "chauffeur.geometry", "chauffeur.driving.judge", "chauffeur.worlds.base")
-    assert all(name.startswith(allowed) for name in own)
+    tells = {"chauffeur.language.meaning.words"}  # says acts, and reads none
+    assert all(name.startswith(allowed) for name in own - tells)
 
 
 def test_purposes_and_refusals_are_no_acts_to_be_judged() -> None:

@@ -11,7 +11,7 @@ import pytest
 SOURCES = Path(__file__).parents[2] / "src" / "chauffeur"
 NAMES = {"highway", "intersection", "parking", "ros", "track", "town", "carla"}
 
-_OTHERS = ("situation", "lane", "plan", "self")
+_OTHERS = ("situation", "lane", "plan", "self", "surface")
 """Whose `world` or `kind` is none of a world: a situation's words, what a lane is for, how a street is drawn."""
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 from chauffeur.bench.kernel.benchmark import Benchmark
 from chauffeur.bench.kernel.run import score
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.kernel.stages import Manifest, StageStore, read_plan, take_over
+from chauffeur.bench.kernel.stages import Manifest, StageStore, read_plan, adopt
 from chauffeur.bench.kernel.store import Row, sole_writer
 from chauffeur.concept import ConfigError, DataError
 
@@ -64,7 +64,7 @@ def merge_shards(
         merged = StageStore[Any].open(out, benchmark, whole)
         try:
             for folder, _ in parts:
-                take_over(merged, folder)
+                adopt(merged, folder)
         finally:
             for store in merged.stores:
                 store.close()

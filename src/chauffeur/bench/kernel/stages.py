@@ -255,10 +255,10 @@ def take_over_shards(stages: StageStore[Any], folder: Path) -> None:
         except DataError:
             continue
         if all(about.get(name) == value for name, value in stages.manifest.about.items()):
-            take_over(stages, part)
+            adopt(stages, part)
 
 
-def take_over(stages: StageStore[Any], part: Path) -> None:
+def adopt(stages: StageStore[Any], part: Path) -> None:
     """Append the rows of another folder of the same run: what is absent here, or failed here only. Raises
     StorageError."""
     for store in stages.stores:

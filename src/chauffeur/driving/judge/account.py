@@ -21,7 +21,7 @@ from chauffeur.language.meaning.words import act_words
 from chauffeur.worlds.town.pack import PLACE_WORDS
 
 TOLD_NOT_TO_CHECK: Final = "told-not-to-v1"
-_SPOT: Final = re.compile(r"[A-Z]+\d+")
+_SPOT: Final = re.compile(r"[A-Z]{1,2}\d{1,3}")
 """A parking spot's own name: `B6`."""
 _STYLES: Final = ("drive carefully", "drive as usual", "drive quickly")
 """Setting `style` of a plan of gains, in words."""
