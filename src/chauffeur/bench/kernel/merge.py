@@ -9,7 +9,7 @@ from typing import Any, Final
 from chauffeur.bench.kernel.benchmark import Benchmark
 from chauffeur.bench.kernel.run import score
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.kernel.stages import Manifest, StageStore, read_plan, adopt
+from chauffeur.bench.kernel.stages import Manifest, StageStore, adopt, read_plan
 from chauffeur.bench.kernel.store import Row, sole_writer
 from chauffeur.concept import ConfigError, DataError
 
