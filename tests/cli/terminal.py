@@ -12,7 +12,6 @@ import termios
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Final
 
 WITHIN_S: Final = 180.0
@@ -39,6 +38,10 @@ def until(process: subprocess.Popen[bytes], screen: int, words: str) -> str:
     return plain
 
 
+def _hear_ctrl_c() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @contextmanager
 def at_a_terminal(command: Sequence[str]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
     """The process, and the end of its terminal where a person sits."""
@@ -50,9 +53,8 @@ def at_a_terminal(command: Sequence[str]) -> Iterator[tuple[subprocess.Popen[byt
         stdout=theirs,
         stderr=theirs,
         env=os.environ | {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"},
-        preexec_fn=partial(
-            signal.signal, signal.SIGINT, signal.SIG_DFL
-        ),  # Ctrl-C, also where tests run in the background
+        # Ctrl-C is heard also where tests run in the background.
+        preexec_fn=_hear_ctrl_c,  # noqa: PLW1509 - the child has one thread
     )
     try:
         yield process, ours
