@@ -57,7 +57,7 @@ def test_figures_are_those_of_the_rows(two: tuple[Path, Path]) -> None:
     assert _figure(scores, "a", "Driving score") == "-39.9 [-126.9, 37.1]"
     assert _figure(scores, "Human driver", "Driving score") == "84.6"
     assert [line.name for line in families.lines] == ["distance", "routing", "all"]
-    assert (_figure(ended, "a", "Crashed"), _figure(ended, "a", "Refused")) == ("4", "4")
+    assert (_figure(ended, "a", "Crashed"), _figure(ended, "a", "Declined")) == ("4", "4")
     assert (_figure(beside, "a", "Lane-aware TTC, median"), _figure(beside, "a", "Own fault")) == ("4.0", "4")
     assert (_figure(cost, "a", "Latency, p95"), _figure(cost, "a", "Tokens in")) == ("1500.00", "100")
     assert _figure(cost, "a", "Cost") == "n/a"

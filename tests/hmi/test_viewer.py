@@ -152,7 +152,7 @@ def test_a_sample_is_told_whole_and_driven_again(content: Content) -> None:
     sample = content.sample(name, place)
     assert sample["goal"].startswith("Be in the lane to the left") and "highway" in sample["context"]
     assert sample["thoughts"] == "As you wish." and sample["program"] and sample["drivable"]
-    assert sample["ending"].startswith("Done as asked") and sample["verdicts"]
+    assert sample["ending"].startswith("Done") and sample["verdicts"]
     drive = content.drive(name, place)
     assert drive["note"] == "" and drive["page"].startswith("<!doctype html>") and 'class="embedded"' in drive["page"]
     refused = next(at for at, row in enumerate(rows) if row["words"] == COMMANDS[4])

@@ -93,12 +93,12 @@ def _ended(outcome: str, title: str, meaning: str) -> Measure:
 
 
 _OUTCOMES: Final = (
-    _ended("success", "Done as asked", "The condition of the command was met."),
+    _ended("success", "Done", "The condition of the command was met."),
     _ended("failure", "Not done", "The condition was judged not met, e.g. not within 60 s."),
     _ended("timeout", "Out of time or road", "Time or road ran out before the condition was met."),
     _ended("collision", "Crashed", "The drive ended in a crash."),
     _ended("off_road", "Left the road", "The drive ended beside the road, or beyond its end."),
-    _ended("refused", "Refused", "The planner or the checks declined; nothing was driven."),
+    _ended("refused", "Declined", "The planner or the checks declined; nothing was driven."),
     _ended("not_driven", "Not driven", "No plan could be had, or the scene could not be set up."),
 )
 

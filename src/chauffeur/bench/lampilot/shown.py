@@ -45,12 +45,12 @@ PERIOD_S = 0.1
 """Control period of LaMPilot's worlds."""
 
 _ENDINGS = {
-    "success": "done as asked",
+    "success": "done",
     "failure": "not done",
     "collision": "crashed",
     "off_road": "left the road",
     "timeout": "ran out of time or road",
-    "refused": "refused",
+    "refused": "declined",
     "not_driven": "not driven",
 }
 _FAULTS = {

@@ -18,9 +18,8 @@ function pair(list, term, value, small) {
   return dd;
 }
 
-/* Speeds in the person's unit, whole; what must not be exceeded is rounded down, but for what storing it has cost. */
+/* Speeds in the person's unit, whole. */
 const pace = (mps) => (mps * trip.pace.of).toFixed(0);
-const atMost = (mps) => Math.floor(mps * trip.pace.of + 0.05).toFixed(0);
 const seconds = (time) => `${time.toFixed(1)} s`;
 
 function fillProgram() {
@@ -200,7 +199,7 @@ function makeInstruments() {
     const mps = drive.speed[index];
     const { unit } = trip.pace;
     const [wanted, limit, distance, stop] = [drive.target[index], drive.limit[index], drive.gap[index], drive.stop[index]];
-    const bounds = [wanted !== null && `set to ${atMost(wanted)}`, limit !== null && `limit ${atMost(limit)}`];
+    const bounds = [wanted !== null && `set to ${pace(wanted)}`, limit !== null && `limit ${pace(limit)}`];
     const behind = distance !== null && mps > 1 ? `${(distance / mps).toFixed(1)} s` : '';
     const told = [
       set('Speed', `${pace(mps)} ${unit}`, bounds.filter(Boolean).join(' · ')),

@@ -7,7 +7,7 @@ import { openLink } from './link.js';
 import { makeMemory } from './memory.js';
 import { makeMicrophone } from './microphone.js';
 import { makeScene } from './scene.js';
-import { NOT_HEARD, atMost, levelWords, speakIn, unitNow, whole } from './words.js';
+import { NOT_HEARD, levelWords, speakIn, unitNow, whole } from './words.js';
 
 const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
@@ -167,7 +167,7 @@ function showScene() {
   conversation.follow(scene);
   const speed = Math.abs(scene.ego.speed_mps);
   write($('speed'), String(whole(speed)));
-  write($('limit'), scene.limit_mps > 0 ? String(atMost(scene.limit_mps)) : '–');
+  write($('limit'), scene.limit_mps > 0 ? String(whole(scene.limit_mps)) : '–');
   const target = scene.target_mps;
   write($('target'), target === null ? 'none' : String(whole(target)));
   for (const unit of document.querySelectorAll('.unit')) write(unit, unitNow());

@@ -1,12 +1,11 @@
 /* Numbers and states as people read them. */
 
-/* Speeds whole, in the unit the person last used; a limit is rounded down, but for what storing it has cost. */
+/* Speeds whole, in the unit the person last used. */
 let unit = 'km/h';
 const OF = { 'km/h': 3.6, mph: 2.23694 };
 export const unitNow = () => unit;
 export const speakIn = (told) => { unit = told; };
 export const whole = (mps) => Math.round(Math.abs(mps) * OF[unit]);
-export const atMost = (mps) => Math.floor(mps * OF[unit] + 0.05);
 export const pace = (mps) => `${whole(mps)} ${unit}`;
 export const seconds = (s) => (s < 0.995 ? `${Math.round(s * 100) * 10} ms` : `${s.toFixed(s < 9.95 ? 1 : 0)} s`);
 
