@@ -36,12 +36,16 @@ ALARM_WORDS: Final[dict[Alarm, str]] = {"stop": "Stop the car!", "distress": "Th
 """What an alarm stands for, in words that are always read as `stop` and `ask`."""
 
 _STOPPED_MPS: Final = 0.1
+_SHOULDER_BRAKING_MPS2: Final = 3.0
+"""On the shoulder there is time."""
 _SLACK_MPS: Final = 0.5
-_LAW_MPS2: Final[dict[str, float]] = {"highway": 30.0, "intersection": 30.0, "parking": 2.0, "town": 1.8}
-"""Factor a of each kind of road's driver on a free road, a (1 - (v / v0)^4) m/s2, by which a target speed is found that
-brakes as wanted. LaMPilot's is cut at 5 (control/actuation.py), those of lots and towns at 2."""
+_LAW_MPS2: Final[dict[str, float]] = {"highway": 30.0, "intersection": 30.0}
+"""Factor a of LaMPilot's law on a free road, a (1 - (v / v0)^4) m/s2, cut at 5 (control/actuation.py)."""
 _USUAL_LAW_MPS2: Final = LAMPILOT_EGO.acceleration_mps2
-"""The same of every other world (`worlds/over_graph.py`)."""
+"""The same of other worlds (`worlds/over_graph.py`)."""
+_EASY: Final = frozenset({"parking", "town"})
+"""Kinds of road whose drivers brake by 3 m/s2 at most towards a lower target, and by less towards a near one."""
+_EASY_MPS2: Final = 3.0
 _STOPPING_INTENTS: Final = frozenset({"stop", "pull_over", "park"})
 
 _STOP_PROGRAM: Final = """def minimal_risk_manoeuvre():
@@ -51,7 +55,7 @@ _STOP_PROGRAM: Final = """def minimal_risk_manoeuvre():
     set_target_lane(get_lane_of(ego))
     set_desired_time_headway(2.0)
     while get_speed_of(ego) > 0.5:
-        set_target_speed(get_speed_of(ego) / (1.0 + {braking:g} / {law:g}) ** 0.25)
+        set_target_speed({slower})
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
@@ -75,7 +79,7 @@ _SAFE_STOP_PROGRAM: Final = """def stop_on_the_shoulder():
             yield autopilot()
         right = get_right_lane(ego)
     while get_speed_of(ego) > 0.5:
-        set_target_speed(get_speed_of(ego) / (1.0 + 3.0 / {law:g}) ** 0.25)
+        set_target_speed({slower})
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
@@ -98,15 +102,16 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
     found = read_emergency(text)
     if found is None or not found.alone:
         return None
-    law = _LAW_MPS2.get(observation.kind, _USUAL_LAW_MPS2)
-    stop = _STOP_PROGRAM.format(braking=MINIMAL_RISK_BRAKING_MPS2, law=law)
+    kind = observation.kind
+    braking = _EASY_MPS2 if kind in _EASY else MINIMAL_RISK_BRAKING_MPS2
+    stop = _STOP_PROGRAM.format(braking=braking, slower=_slower(kind, braking))
     match found.kind:
         case "stop":
             return _plan(STOPPING, stop, "stop", 0.0)
         case "safe_stop" if shoulder_at_right(observation):
             return _plan(
                 "Hazard lights on: I make for the shoulder and stop there.",
-                _SAFE_STOP_PROGRAM.format(law=law),
+                _SAFE_STOP_PROGRAM.format(slower=_slower(kind, _SHOULDER_BRAKING_MPS2)),
                 "pull_over",
                 0.0,
             )
@@ -124,6 +129,12 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
         case "no_stop":
             speed = round(max(observation.ego.speed_mps, least_speed_mps(observation) or 0.0), 2)
             return _plan(GOING_ON, _GO_ON_PROGRAM.format(speed=speed), "speed.keep", speed)
+
+
+def _slower(kind: str, braking_mps2: float) -> str:
+    """Expression of the target speed by which the driver on a kind of road brakes evenly."""
+    law = _LAW_MPS2.get(kind, _USUAL_LAW_MPS2)
+    return "0.0" if kind in _EASY else f"get_speed_of(ego) / (1.0 + {braking_mps2:g} / {law:g}) ** 0.25"
 
 
 def question_to(found: Emergency) -> str:
