@@ -14,7 +14,7 @@ from chauffeur.driving.scenarios import find
         ("overtake", 3.5, 5.0),
         ("cruise", 3.5, 5.0),
         ("open-road-straight", 3.0, 5.0),
-        ("parking", 2.0, 3.5),
+        ("parking", 2.0, 4.5),
         ("town", 2.0, 3.5),
     ],
 )
