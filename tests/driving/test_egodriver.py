@@ -174,6 +174,18 @@ def test_nothing_is_driven_before_pose_and_route_are_known() -> None:
         assert len(Trajectory.from_proto(stub.drive(DriveRequest(session_uuid="one")).trajectory)) == 0
 
 
+def test_a_planner_without_a_plan_is_not_asked_in_every_period() -> None:
+    silent = Writes()
+    driven(silent, "Go.", 25)
+    assert len(silent.asked) == 3
+
+
+def test_numbers_that_are_none_hold_the_car() -> None:
+    with asked_by_carla(EgoDriver(Writes(refusal="No."), "Go.")) as stub:
+        held = answer(stub, CarlaRendererData(), speed_mps=float("nan"))  # the library answers with the present pose
+    assert np.allclose(held.positions, 0.0)
+
+
 def test_a_route_bends_as_it_is_told() -> None:
     session = SessionState("one", 0, "scene", {})
     session.ego_trajectory.append(0, Pose.from_xyz_yaw(100.0, 50.0, 0.0, np.pi / 2.0))

@@ -31,6 +31,10 @@ Concurrency = Annotated[
 ]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Print what would be published; publish nothing.")]
 LimitsName = Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")]
+DrivesOf = Annotated[Path | None, typer.Option(help="DbLv1 folder, to show the drives of runs that kept no scenes.")]
+Gallery = Annotated[
+    int | None, typer.Option(min=0, help="Items shown of each run; default up to 12, fewer of many runs.")
+]
 MaxRequests = Annotated[int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)]
 MaxUsd = Annotated[float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)]
 Microphone = Annotated[

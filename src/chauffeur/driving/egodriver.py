@@ -31,11 +31,9 @@ from chauffeur.concept import (
     CameraImage,
     ChauffeurError,
     Context,
-    History,
     Instruction,
     Limits,
     Observation,
-    Plan,
     Policy,
     Scenario,
     ScenarioError,
@@ -45,11 +43,11 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe_with_traffic
 from chauffeur.driving import event_loop
-from chauffeur.driving.emergency import not_checked, planned_for
 from chauffeur.driving.episode import run_episode
 from chauffeur.driving.fallback import keep_lane_and_gap
-from chauffeur.driving.planning import PLAN_WITHIN_S, Judged, Planned, PlanSteps, plan_once
-from chauffeur.driving.session import check_drive
+from chauffeur.driving.loop import steps_at
+from chauffeur.driving.planning import PLAN_WITHIN_S, Planned, PlanSteps, no_pictures, plan_once
+from chauffeur.driving.session import Forgetful, check_drive
 from chauffeur.executors import Executor, executor_for
 from chauffeur.executors.base import HeldSetpoints
 from chauffeur.foreign.waypoints import FUTURE, STEP_S
@@ -70,7 +68,8 @@ WISH: Final = "Follow the road at the speed limit."
 HORIZON_S: Final = 5.0
 """Length of an answer: AlpaSim's own drivers answer with 4 to 6.4 s."""
 AGAIN_S: Final = 1.0
-"""Waypoints that end while the car moves are asked for again after so long. Every other policy stands."""
+"""Waypoints that end while the car moves are asked for again after so long, and so is a planner that had no plan. Every
+other policy stands."""
 _BEHIND_M: Final = 20.0
 """The lane reaches so far behind the first waypoint of the route, which lies at the car or ahead of it."""
 _MOST_TICKS: Final = 50
@@ -96,7 +95,7 @@ class _Rollout:
     Attributes:
         planned: Newest plan with its verdicts; None before the first.
         origin: The ego when it was made.
-        at_us: Then, in the other simulator's time.
+        at_us: When one was last asked for, in the other simulator's time; None before that.
         world: What the policy is bound to: set to each instant, never stepped.
         executor: Of a program, which states set-points period by period; None for what is started anew each time.
         ticked_us: Up to when it has been asked.
@@ -106,7 +105,7 @@ class _Rollout:
     world: RouteWorld = field(default_factory=RouteWorld)
     planned: Planned | None = None
     origin: VehicleState | None = None
-    at_us: int = 0
+    at_us: int | None = None
     executor: Executor | None = None
     ticked_us: int = 0
     held: HeldSetpoints | None = None
@@ -148,7 +147,7 @@ class EgoDriver(BaseDriver):
             rollout.close()
 
     def drive(self, ctx: DriveContext) -> DriveResult:
-        """The way ahead for 5 s; none, which holds the car, before pose and route are known.
+        """The way ahead for 5 s; none, which holds the car, where pose or route are not known or make no sense.
 
         A wish that is declined, and a planner that fails, leave the car to keep its lane and speed.
         """
@@ -156,7 +155,11 @@ class EgoDriver(BaseDriver):
         if scenario is None:
             return DriveResult(RigTrajectory.empty())
         rollout = self._rollouts[ctx.session.uuid]
-        now = rollout.world.reset(scenario)
+        try:
+            now = rollout.world.reset(scenario)
+        except ScenarioError as error:  # a number that is none, a route without length
+            _log.warning("%s: %s", self.name, error)
+            return DriveResult(RigTrajectory.empty())
         scalars = {"speed_mps": now.ego.speed_mps}
         if self._is_due(rollout, ctx.time_now_us):
             scalars["planning_s"] = self._plan(rollout, now, ctx)
@@ -164,54 +167,44 @@ class EgoDriver(BaseDriver):
         return DriveResult(_in_rig(poses, ctx.time_now_us), debug_scalars=scalars)
 
     def _is_due(self, rollout: _Rollout, now_us: int) -> bool:
-        if rollout.planned is None:
-            return True
-        policy = rollout.planned.plan.policy
-        return isinstance(policy, Trajectory) and _goes_on(policy) and now_us - rollout.at_us >= round(AGAIN_S * 1e6)
+        if rollout.at_us is not None and now_us - rollout.at_us < round(AGAIN_S * 1e6):
+            return False
+        policy = None if rollout.planned is None else rollout.planned.plan.policy
+        return rollout.planned is None or (isinstance(policy, Trajectory) and _goes_on(policy))
 
     def _plan(self, rollout: _Rollout, now: Observation, ctx: DriveContext) -> float:
+        """Ask for a plan; how long it took, s. Without one the plan before it stays."""
         rollout.at_us = ctx.time_now_us
         try:
             planned = event_loop.run(plan_once(self._wish, self._steps(now, motion_of(ctx, now), _pictures(ctx))))
         except ChauffeurError as error:
             _log.warning("%s: no plan: %s", self.name, error)
-            if rollout.planned is None:
-                return 0.0
-            planned = rollout.planned
-        if planned is not rollout.planned:
-            if planned.refusal:
-                _log.warning("%s: not driven: %s", self.name, planned.refusal)
-            rollout.close()
-            rollout.planned, rollout.origin, rollout.ticked_us = planned, now.ego, ctx.time_now_us
+            return 0.0
+        if planned.refusal:
+            _log.warning("%s: not driven: %s", self.name, planned.refusal)
+        rollout.close()
+        rollout.planned, rollout.origin, rollout.ticked_us = planned, now.ego, ctx.time_now_us
         return planned.plan.latency_s
 
     def _steps(self, now: Observation, motion: str, images: tuple[CameraImage, ...]) -> PlanSteps:
-        async def describe() -> Context:
-            context = describe_with_traffic(now)
+        def describe(observation: Observation) -> Context:
+            context = describe_with_traffic(observation)
             return replace(context, text=f"{context.text}\n{motion}")
 
-        async def recall(instruction: Instruction, context: Context) -> History:
-            del instruction, context
-            return History()
+        def system(limits: Limits) -> SystemMessage:
+            return build_system_message("few-shot", limits=limits, vocabulary=vocabulary_of(now.kind))
 
-        def system() -> SystemMessage:
-            return build_system_message("few-shot", limits=self._limits, vocabulary=vocabulary_of(now.kind))
-
-        async def check(plan: Plan, own: bool) -> Judged:
-            return (not_checked(plan) if own else check_drive(plan, now, self._limits)), now
-
-        return PlanSteps(
-            planner=self._planner,
-            limits=self._limits,
+        steps = steps_at(
+            now,
+            self._planner,
+            Forgetful(),
+            self._limits,
             describe=describe,
-            recall=recall,
             system=system,
-            own=lambda text: planned_for(text, now),
-            check=check,
-            see=lambda: images if looks(self._planner) else (),
-            observe=lambda: now,
-            within_s=PLAN_WITHIN_S,
+            check=check_drive,
+            see=(lambda _: images) if looks(self._planner) else no_pictures,
         )
+        return replace(steps, within_s=PLAN_WITHIN_S)
 
     def _ahead(self, rollout: _Rollout, scenario: Scenario, now: Observation, now_us: int) -> list[Pose]:
         """Where the rear axle will be, every 0.1 s from now on, in the frame that it has now."""
@@ -230,11 +223,11 @@ class EgoDriver(BaseDriver):
         poses = [_seen(here, _rear(ego)) for ego in egos]
         return poses + [poses[-1]] * (round(HORIZON_S / DT_S) - len(poses))  # it stands where the foreseen drive ended
 
-    def _driven(self, rollout: _Rollout, ahead: RouteWorld, now: Observation, now_us: int) -> Executor | _Held:
+    def _driven(self, rollout: _Rollout, ahead: RouteWorld, now: Observation, now_us: int) -> Executor | _Held | None:
+        """What drives ahead; None for the world's own driver, which keeps lane and speed."""
         planned = rollout.planned
-        usual = _Held(HeldSetpoints(ahead.driver().initial_setpoints()))
         if planned is None or planned.refusal or planned.plan.policy is None:
-            return usual
+            return None
         policy = planned.plan.policy
         try:
             if policy.kind != "program":
@@ -244,8 +237,8 @@ class EgoDriver(BaseDriver):
             self._tick(rollout, now, policy, now_us)
         except ScenarioError as error:
             _log.warning("%s: cannot be driven here: %s", self.name, error)
-            return usual
-        return usual if rollout.held is None else _Held(rollout.held)
+            return None
+        return None if rollout.held is None else _Held(rollout.held)
 
     def _tick(self, rollout: _Rollout, now: Observation, policy: Policy, now_us: int) -> None:
         """Ask the program for the control periods that have passed. One that fails keeps lane and gap from then on."""
@@ -277,7 +270,7 @@ def situation_of(ctx: DriveContext, limit_mps: float) -> Scenario | None:
         limit_mps: Speed limit where none is told.
 
     Returns:
-        None before a pose and two waypoints are known, and where a number is none.
+        None before a pose and two waypoints are known.
     """
     session = ctx.session
     with session.lock:

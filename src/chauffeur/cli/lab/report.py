@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.options import DrivesOf, Gallery
+
 
 def report(
     runs: Annotated[
@@ -18,12 +20,8 @@ def report(
     metrics: Annotated[
         str | None, typer.Option(help="Score runs of lampilot by `origin` or `paper`; default the ruler they agree on.")
     ] = None,
-    gallery: Annotated[
-        int | None, typer.Option(min=0, help="Items shown of each run; default up to 12, fewer of many runs.")
-    ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="DbLv1 folder, to show the drives of runs that kept no scenes.")
-    ] = None,
+    gallery: Gallery = None,
+    data: DrivesOf = None,
     inspect: Annotated[
         Path | None, typer.Option(metavar="FILE.eval", help="Also write the run as a log of Inspect AI (one run).")
     ] = None,

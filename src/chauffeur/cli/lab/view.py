@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.options import DrivesOf, Gallery
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -25,12 +27,8 @@ def view(
     export: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="Write all of it as one self-contained page instead.")
     ] = None,
-    gallery: Annotated[
-        int | None, typer.Option(min=0, help="Items shown of each run; default up to 12, fewer of many runs.")
-    ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="DbLv1 folder, to show the drives of runs that kept no scenes.")
-    ] = None,
+    gallery: Gallery = None,
+    data: DrivesOf = None,
     port: Annotated[int, typer.Option(min=0, max=65_535, help="Port of the page; 0 takes a free one.")] = 0,
     browser: Annotated[
         bool | None, typer.Option("--open/--no-open", help="Open the page in the browser.", show_default=False)
