@@ -54,7 +54,7 @@ from chauffeur.foreign.waypoints import FUTURE, STEP_S
 from chauffeur.geometry import Polyline, Pose
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import build_system_message
-from chauffeur.planners.prompts.waypoints import HISTORY, motion_words
+from chauffeur.planners.prompts.waypoints import HISTORY, command_of, motion_words
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.route import CAR, DT_S, LANE, RouteWorld
@@ -80,8 +80,6 @@ _STOP_LINE_M: Final = 0.5
 _STANDS_MPS: Final = 0.3
 _LEAST_MPS: Final = 5.0
 """A car that stands looks so far ahead for its next turn as one this fast."""
-_ASIDE_M: Final = 2.0
-"""ST-P3's and UniAD's command: left or right where the car is so far aside after 3 s."""
 _MOST_WAYPOINTS: Final = 1_500
 _MOST_AGENTS: Final = 400
 _KINDS: Final[Mapping[str, str]] = {"walker": "pedestrian"}
@@ -321,7 +319,7 @@ def _command(now: Observation) -> str:
     ahead = centre.nearest(now.ego.x_m, now.ego.y_m) + max(now.ego.speed_mps, _LEAST_MPS) * STEP_S * FUTURE
     there = centre.at(min(ahead, centre.length_m))
     aside = Pose(now.ego.x_m, now.ego.y_m, now.ego.heading_rad).sees(there.x_m, there.y_m)[1]
-    return "go straight" if abs(aside) < _ASIDE_M else "turn left" if aside > 0.0 else "turn right"
+    return command_of(aside)
 
 
 def _before(route: list[tuple[float, float]]) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from pydantic import TypeAdapter
 
 from chauffeur.concept import DataError
 from chauffeur.foreign.waypoints import FUTURE, STEP_S
-from chauffeur.planners.prompts.waypoints import HISTORY
+from chauffeur.planners.prompts.waypoints import HISTORY, command_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,8 +51,6 @@ _MOST_STAMP: Final = 1e17
 _MOST_BYTES: Final = 4_000_000_000
 """The largest table of the whole of nuScenes (`sample_annotation`, which is not read) has 1.5 GB."""
 MARKS: Final = "openloop.json"
-ASIDE_M: Final = 2.0
-"""ST-P3's and UniAD's high-level command: left or right where the car is so far aside after 3 s."""
 
 Row = Mapping[str, Any]
 
@@ -128,7 +126,7 @@ def future_command(future: FloatArray) -> str:
     last = future[FUTURE - 1, 1]
     if not math.isfinite(last):
         return ""
-    return "turn left" if last >= ASIDE_M else "turn right" if last <= -ASIDE_M else "go straight"
+    return command_of(float(last))
 
 
 class NuScenesTables:

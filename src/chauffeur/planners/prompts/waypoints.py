@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 HISTORY: Final = 4
 """Places before the present one, half a second apart: 2 s."""
+ASIDE_M: Final = 2.0
+"""ST-P3's and UniAD's high-level command: left or right where the way is so far aside after 3 s."""
 ROLE: Final = (
     "You drive a car. The picture is of its front camera, now. Positions are in the car's own frame of this instant, "
     "in metres: x ahead, y to the left; the car is at (0, 0)."
@@ -45,6 +47,11 @@ def motion_words(history: FloatArray, command: str = "") -> str:
     speeds = ", ".join(f"{math.hypot(b[0] - a[0], b[1] - a[1]) / STEP_S:.1f}" for a, b in legs)
     said = f"\n{_SAID}{command}" if command else ""
     return f"{_WAS}{past}.\nSpeed over each half second, m/s: {speeds}.{said}"
+
+
+def command_of(aside_m: float) -> str:
+    """High-level command for a way that lies so far to the left after 3 s."""
+    return "turn left" if aside_m >= ASIDE_M else "turn right" if aside_m <= -ASIDE_M else "go straight"
 
 
 def tells_motion(text: str) -> bool:
