@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import io
 import time
-from base64 import b64encode
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from chauffeur.foreign.model_text import read_model_text
 from chauffeur.foreign.waypoints import FUTURE, STEP_S, read_waypoints
 from chauffeur.planners.base import Answerer, declined, planned
 from chauffeur.planners.llm_reply import tidy
-from chauffeur.planners.prompts.waypoints import HISTORY, ROLE, ask, motion_words, tells_motion, with_wish
+from chauffeur.planners.prompts.waypoints import HISTORY, ROLE, ask, asked_of, motion_words, tells_motion, with_wish
 from chauffeur.planners.registry import make_answerer
 
 if TYPE_CHECKING:
@@ -92,11 +91,7 @@ class WaypointPlanner:
         if not tells_motion(context):
             context = f"{context}\n{motion_words(_steady(request.context.situation.speed_mps))}"
         text = f"{ROLE}\n{context}\n{with_wish(ask(FUTURE), request.instruction.text)}"
-        parts: list[object] = [{"type": "text", "text": text}]
-        if request.images:
-            shown = {"type": "image_url", "image_url": {"url": _data_uri(request.images[-1])}}
-            parts = [{"type": "text", "text": "Front camera, now:"}, shown, *parts]
-        return cast("Message", {"role": "user", "content": parts})
+        return asked_of(_jpeg(request.images[-1]) if request.images else None, text)
 
 
 def _steady(speed_mps: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -105,11 +100,11 @@ def _steady(speed_mps: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64
     return np.stack((back, np.zeros_like(back), np.zeros_like(back)), axis=1)
 
 
-def _data_uri(image: CameraImage) -> str:
+def _jpeg(image: CameraImage) -> bytes:
     from PIL import Image
 
     picture = Image.fromarray(image.pixels())
     picture.thumbnail((SIDE_PX, SIDE_PX))
     out = io.BytesIO()
     picture.save(out, "JPEG", quality=90)
-    return f"data:image/jpeg;base64,{b64encode(out.getvalue()).decode('ascii')}"
+    return out.getvalue()

@@ -11,11 +11,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from chauffeur.bench.openloop.nuscenes import FUTURE, PlanningSample
-from chauffeur.bench.pictures import data_uri, read_picture
-from chauffeur.planners.prompts.waypoints import ROLE, ask, motion_words, waypoints_text, with_wish
+from chauffeur.bench.pictures import read_picture
+from chauffeur.planners.prompts.waypoints import ROLE, ask, asked_of, motion_words, waypoints_text, with_wish
 
 if TYPE_CHECKING:
     from chauffeur.planners.prompts import Message
@@ -47,13 +47,7 @@ def question(sample: PlanningSample, setting: OpenLoopSetting, instruction: str 
 
 def opening(sample: PlanningSample, text: str, shown: Shown, side_px: int) -> Message:
     """A turn with the picture and a text. Raises DataError: the picture is missing or damaged."""
-    picture = data_uri(read_picture(sample.picture, side_px, "blank" if shown == "blank" else "real"))
-    parts: list[dict[str, Any]] = [
-        {"type": "text", "text": "Front camera, now:"},
-        {"type": "image_url", "image_url": {"url": picture}},
-        {"type": "text", "text": text},
-    ]
-    return cast("Message", {"role": "user", "content": parts})
+    return asked_of(read_picture(sample.picture, side_px, "blank" if shown == "blank" else "real"), text)
 
 
 def training_lines(samples: Iterable[PlanningSample], root: Path) -> Iterator[str]:

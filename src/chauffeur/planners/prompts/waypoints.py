@@ -7,6 +7,7 @@ in the ego frame of the instant: x ahead, y left, m.
 from __future__ import annotations
 
 import math
+from base64 import b64encode
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -15,6 +16,8 @@ from chauffeur.foreign.waypoints import STEP_S
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from chauffeur.planners.prompts.turns import ImagePart, Message, TextPart
 
     FloatArray = NDArray[np.float64]
 
@@ -88,6 +91,16 @@ def ask(steps: int) -> str:
         f"Where will the car be {', '.join(times)} and {last} s from now? "
         f"Answer with {_WORDS.get(steps, steps)} positions, nothing else: [{form}]"
     )
+
+
+def asked_of(jpeg: bytes | None, text: str) -> Message:
+    """The turn that asks: the front camera's picture, where there is one, and the text."""
+    parts: list[TextPart | ImagePart] = [{"type": "text", "text": text}]
+    if jpeg is not None:
+        url = f"data:image/jpeg;base64,{b64encode(jpeg).decode('ascii')}"
+        seen: ImagePart = {"type": "image_url", "image_url": {"url": url}}
+        parts = [{"type": "text", "text": "Front camera, now:"}, seen, *parts]
+    return {"role": "user", "content": parts}
 
 
 def waypoints_text(waypoints: FloatArray) -> str:
